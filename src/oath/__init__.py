@@ -1,0 +1,1 @@
+"""OATH: task assignment and planning for mixed robot fleets among obstacles."""

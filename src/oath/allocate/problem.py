@@ -1,0 +1,59 @@
+"""What an allocator is given: one allocation round as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from oath.model import Route
+
+WAITING = "waits for a robot"
+"""Why a task that some robot can do is not in any route after a round."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Problem:
+    """R robots, P open tasks (not picked up by anyone yet) and L locations.
+
+    Indices refer to `robots`, `tasks` and the rows of `cost`. Every array is read-only.
+    """
+
+    robots: tuple[str, ...]
+    tasks: tuple[str, ...]
+    start: NDArray[np.int32]
+    """(R,) location where each robot is free to begin something new."""
+    pickup: NDArray[np.int32]
+    """(P,) location of a task's first stop."""
+    delivery: NDArray[np.int32]
+    """(P,) location of its last stop; the same as `pickup` for a visit."""
+    visit: NDArray[np.bool_]
+    """(P,) the task has one stop only and loads nothing."""
+    service_time: NDArray[np.float64]
+    """(P,) time at each stop [s]."""
+    type: NDArray[np.int32]
+    """(P,) the task's type, a column of `capability`."""
+    capability: NDArray[np.float64]
+    """(R, T) how well a robot does a type, 0 = not at all."""
+    capacity: NDArray[np.int32]
+    """(R,) tasks carried at once, less what is carried now."""
+    speed: NDArray[np.float64]
+    """(R,) [m/s]."""
+    cost: NDArray[np.float64]
+    """(M, L, L) travel cost [m] per mode of travel, inf = unreachable."""
+    mode: NDArray[np.int32]
+    """(R,) which of the M cost matrices a robot uses."""
+    busy: NDArray[np.bool_]
+    """(R,) the robot still has a route; `routes` says which."""
+    routes: tuple[Route, ...]
+    """(R,) what each robot is doing now; its tasks that are not picked up stand in `tasks` too."""
+
+    def feasible(self) -> NDArray[np.bool_]:
+        """(R, P): the robot can do the type, has room, reaches pickup and from there delivery."""
+        cost = self.cost[self.mode]  # (R, L, L)
+        r = np.arange(len(self.robots))
+        there = np.isfinite(cost[r[:, None], self.start[:, None], self.pickup[None, :]])
+        on = np.isfinite(cost[:, self.pickup, self.delivery])
+        room = (self.capacity[:, None] > 0) | self.visit[None, :]
+        return there & on & room & (self.capability[:, self.type] > 0)

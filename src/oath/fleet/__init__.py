@@ -1,0 +1,1 @@
+"""Actions to robots, robots to events."""

@@ -1,0 +1,1 @@
+"""The workspace, the roadmap through it, and what travel on it costs."""
