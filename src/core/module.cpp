@@ -3,9 +3,15 @@
 
 namespace nb = nanobind;
 
-void bind_selection(nb::module_& m);
+void bind_graph(nb::module_& m);
+void bind_planner(nb::module_& m);
+void bind_pull(nb::module_& m);
+void bind_workspace(nb::module_& m);
 
 NB_MODULE(_core, m) {
-    m.doc() = "Compiled algorithms of OATH; every function releases the interpreter lock.";
-    bind_selection(m);
+    m.doc() = "Compiled algorithms of OATH; those that take long release the interpreter lock.";
+    bind_workspace(m);
+    bind_graph(m);
+    bind_planner(m);
+    bind_pull(m);
 }

@@ -1,0 +1,390 @@
+"""The roadmap: sampled points and corners joined by the Delaunay edges along which robots fit."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import Delaunay, QhullError, cKDTree
+
+from oath import _core
+from oath.model import Mission, Obstacle, Point
+from oath.world.halton import Density, Halton, sample
+from oath.world.workspace import Mode, Workspace, Zones, corners, polygon_corners
+
+Array = NDArray[np.float64]
+Edges = NDArray[np.int32]
+
+MICRO = 1e6
+"""Costs are integers [um]: sums are exact, so a repaired search equals a fresh one."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """How a roadmap is made; `corners=False` is the ablation without corner nodes."""
+
+    points: int = 1000
+    density: Density = field(default_factory=Density)
+    corners: bool = True
+    margin: float = 0.01
+    """Corner nodes keep this much more than the robot's radius [m]."""
+    links: int = 14
+    """Nodes that an inserted node is joined to, if that many are in sight."""
+    sights: int = 32
+    """Nearest corner nodes that corner nodes and inserted nodes look at; those seen are joined."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seconds:
+    """Wall clock of the stages of a build [s]."""
+
+    sampling: float
+    triangulation: float
+    collision: float
+
+    @property
+    def total(self) -> float:
+        """All stages [s]."""
+        return self.sampling + self.triangulation + self.collision
+
+
+class Roadmap:
+    """Nodes and edges through a workspace, with one travel cost per edge and mode.
+
+    Nodes and edges are only appended, never renumbered. A change of the workspace changes costs.
+
+    Parameters
+    ----------
+    workspace, zones
+        What blocks robots, and what their moves make true.
+    modes
+        The ways of travelling of all robots.
+    """
+
+    def __init__(
+        self,
+        workspace: Workspace,
+        zones: Zones,
+        modes: Sequence[Mode],
+        params: Params,
+        rng: np.random.Generator,
+        *,
+        corner_points: Array,
+    ) -> None:
+        self.workspace, self.zones, self.params = workspace, zones, params
+        self.modes = tuple(modes)
+        self.graph = _core.Graph(len(modes))
+        self._sequence = Halton(workspace.bounds, rng)
+        self._node_at: dict[Point, int] = {}
+        begin = time.perf_counter()
+        motions = [mode.motion for mode in modes]
+        nodes = sample(workspace, motions, params.points, params.density, rng)
+        self.sampled = len(nodes)
+        nodes = np.concatenate([nodes, self._useful(corner_points)])
+        order = _along_curve(nodes)
+        nodes = nodes[order]
+        self._corners = np.flatnonzero(order >= self.sampled)
+        self.graph.add_nodes(nodes)
+        sampled = time.perf_counter()
+        pairs = _delaunay_edges(nodes)
+        sights = self._sights(nodes[self._corners], self._corners)
+        pairs = _unique(np.concatenate([pairs, sights]), len(nodes))
+        triangulated = time.perf_counter()
+        self._add_edges(pairs)
+        self.seconds = Seconds(
+            sampling=sampled - begin,
+            triangulation=triangulated - sampled,
+            collision=time.perf_counter() - triangulated,
+        )
+
+    # -- what there is
+
+    def nodes(self) -> Array:
+        """Positions (n, 2) [m]."""
+        nodes: Array = self.graph.points()
+        return nodes
+
+    def edges(self, mode: int | None = None) -> Edges:
+        """Nodes (m, 2) of the edges open in a mode, or in any."""
+        ends: Edges = self.graph.ends()
+        modes = range(len(self.modes)) if mode is None else [mode]
+        is_open = np.zeros(len(ends), dtype=np.bool_)
+        for m in modes:
+            is_open |= self.graph.costs(m) < _core.UNREACHABLE
+        return ends[is_open]
+
+    def components(self, mode: int) -> NDArray[np.int32]:
+        """Component (n,) of every node over the edges open in a mode."""
+        a, b = self.edges(mode).T
+        n = self.graph.size
+        matrix = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(n, n))
+        labels: NDArray[np.int32] = connected_components(matrix, directed=False)[1]
+        return labels
+
+    def travel(
+        self,
+        mode: int,
+        sources: Sequence[int],
+        targets: Sequence[int],
+        avoid: frozenset[str] = frozenset(),
+    ) -> Array:
+        """Travel costs (sources, targets) [m] that touch no atom to avoid; inf = unreachable."""
+        micro = self.graph.travel(mode, list(sources), list(targets), self.allowed(avoid))
+        return np.where(micro < _core.UNREACHABLE, micro / MICRO, np.inf)
+
+    def allowed(self, avoid: frozenset[str]) -> list[int]:
+        """Flag the label classes that touch no atom to avoid."""
+        return [int(not (atoms & avoid)) for atoms in self.zones.classes]
+
+    # -- what changes
+
+    def insert(self, at: Point) -> int:
+        """Return the node at a point [m]; if there is none, add it and join it to those in sight.
+
+        The node may stay alone where no robot fits; nothing else changes.
+        """
+        if at not in self._node_at:
+            self._node_at[at] = self.graph.size
+            self._append(np.array([at], dtype=float))
+        return self._node_at[at]
+
+    def add_obstacle(self, obstacle: Obstacle) -> NDArray[np.int32]:
+        """Put an obstacle in; return the edges whose cost changed in some mode.
+
+        Corner nodes are appended around it, so that there is a way past it wherever a robot fits.
+        """
+        self.workspace.add(obstacle)
+        changed = self._refresh(obstacle)
+        if self.params.corners:
+            before = self.graph.edges
+            self._append(self._useful(self._corners_of(obstacle)))
+            changed = np.concatenate([changed, np.arange(before, self.graph.edges, dtype=np.int32)])
+        return changed
+
+    def remove_obstacle(self, id: str) -> NDArray[np.int32]:
+        """Take an obstacle out; return the edges whose cost changed in some mode."""
+        return self._refresh(self.workspace.remove(id))
+
+    def links(self, at: Point, mode: int) -> tuple[list[int], list[int], list[int]]:
+        """Nodes that a robot at a point can drive to straight, their costs [um] and labels."""
+        here = np.array([at], dtype=float)
+        seen = self._in_sight(here[0], self.modes[mode])
+        a, b = np.repeat(here, len(seen), axis=0), self.nodes()[seen]
+        costs = self._micro(a, b, self.modes[mode])
+        return seen.tolist(), costs.tolist(), self.zones.labels(a, b).tolist()
+
+    def connect(self, wanted: Mapping[int, Sequence[int]]) -> None:
+        """Sample on between components until, per mode, the wanted nodes hang together.
+
+        `wanted` gives each mode's nodes. What still does not hang together after a bounded effort
+        stays apart; the caller names it.
+        """
+        count = max(200, self.params.points // 4)
+        for _ in range(6):
+            apart = [m for m, nodes in wanted.items() if self._apart(m, nodes)]
+            if not apart:
+                return
+            self._append(self._bridges(apart, count), bridges_only=True)
+            count *= 2
+
+    # -- inside
+
+    def _apart(self, mode: int, nodes: Sequence[int]) -> bool:
+        return len(set(self.components(mode)[list(nodes)].tolist())) > 1
+
+    def _bridges(self, modes: Sequence[int], count: int) -> Array:
+        candidates = self._sequence.take(count)
+        keep = np.zeros(count, dtype=np.bool_)
+        for mode in (self.modes[m] for m in modes):
+            keep |= self.workspace.clearance(candidates, mode.motion, 1.0) >= mode.radius
+        return candidates[keep]
+
+    def _useful(self, points: Array) -> Array:
+        """The points inside the bounds where some robot fits, each once."""
+        x0, y0, x1, y1 = self.workspace.bounds
+        x, y = points.T
+        points = points[(x >= x0) & (x <= x1) & (y >= y0) & (y <= y1)]
+        keep = np.zeros(len(points), dtype=np.bool_)
+        for mode in self.modes:
+            keep |= self.workspace.clearance(points, mode.motion, 2 * mode.radius) >= mode.radius
+        return np.unique(np.round(points[keep], 6), axis=0)
+
+    def _corners_of(self, obstacle: Obstacle) -> Array:
+        offsets = sorted({mode.radius for mode in self.modes})
+        points = [
+            point
+            for radius in offsets
+            for point in polygon_corners(obstacle.polygon, radius + self.params.margin)
+        ]
+        return np.array(points, dtype=float).reshape(-1, 2)
+
+    def _in_sight(self, at: Array, mode: Mode) -> NDArray[np.intp]:
+        """Nearest nodes to which a robot can drive straight; looks further while it finds none."""
+        look = 4 * self.params.links
+        nodes = self.nodes()
+        while True:
+            near = self.graph.nearest(at[0], at[1], look)
+            a = np.repeat(at[None], len(near), axis=0)
+            seen = near[self.workspace.free(a, nodes[near], mode)][: self.params.links]
+            if len(seen) or look >= min(self.graph.size, 4096):
+                return seen.astype(np.intp)
+            look *= 4
+
+    def _sights(self, points: Array, nodes: NDArray[np.intp]) -> NDArray[np.int64]:
+        """Pairs (m, 2) of each point's node and the corner nodes nearest to it."""
+        if not len(self._corners) or not len(points):
+            return np.empty((0, 2), dtype=np.int64)
+        tree = cKDTree(self.nodes()[self._corners])
+        _, near = tree.query(points, k=min(self.params.sights, len(self._corners)))
+        near = self._corners[near.reshape(len(points), -1)]
+        pairs = np.stack([np.repeat(nodes, near.shape[1]), near.ravel()], axis=1)
+        return pairs[pairs[:, 0] != pairs[:, 1]].astype(np.int64)
+
+    def _append(self, points: Array, *, bridges_only: bool = False) -> None:
+        """Append nodes and join each to the nodes in sight in any mode."""
+        for at in points:
+            seen = [self._in_sight(at, mode) for mode in self.modes]
+            joined = np.unique(np.concatenate(seen)) if seen else np.empty(0, dtype=np.intp)
+            if bridges_only and not self._joins(seen):
+                continue
+            self.graph.add_nodes(at[None])
+            new = np.array([self.graph.size - 1])
+            pairs = np.stack([np.repeat(new, len(joined)), joined], axis=1)
+            pairs = np.concatenate([pairs, self._sights(at[None], new)])
+            pairs = _unique(pairs, self.graph.size)
+            self._add_edges(pairs)
+
+    def _joins(self, seen: Sequence[NDArray[np.intp]]) -> bool:
+        """Whether the nodes in sight lie in different components of some mode."""
+        return any(len(set(self.components(m)[nodes].tolist())) > 1 for m, nodes in enumerate(seen))
+
+    def _micro(self, a: Array, b: Array, mode: Mode) -> NDArray[np.int64]:
+        length = self.workspace.length(a, b, mode.motion)
+        micro: NDArray[np.int64] = np.ceil(length * MICRO).astype(np.int64)
+        return micro
+
+    def _add_edges(self, pairs: NDArray[np.integer]) -> None:
+        nodes = self.nodes()
+        a, b = nodes[pairs[:, 0]], nodes[pairs[:, 1]]
+        # An edge through a wall is blocked for good; one through an obstacle may open again.
+        least = min(mode.radius for mode in self.modes)
+        core = self.workspace.core
+        keep = core.free(a, b, least, self.workspace.permanent()).astype(np.bool_)
+        pairs, a, b = pairs[keep], a[keep], b[keep]
+        first = self.graph.edges
+        one, other = np.ascontiguousarray(pairs.T, dtype=np.int32)
+        self.graph.add_edges(one, other, self.zones.labels(a, b))
+        self._price(np.arange(first, self.graph.edges, dtype=np.int32), a, b)
+
+    def _price(self, edges: NDArray[np.int32], a: Array, b: Array) -> NDArray[np.bool_]:
+        """Set the costs of edges with these ends in every mode; tell which changed."""
+        changed = np.zeros(len(edges), dtype=np.bool_)
+        for m, mode in enumerate(self.modes):
+            costs = np.full(len(edges), _core.UNREACHABLE, dtype=np.int64)
+            free = self.workspace.free(a, b, mode)
+            costs[free] = self._micro(a[free], b[free], mode)
+            changed |= costs != self.graph.costs(m)[edges]
+            self.graph.set_costs(m, edges, costs)
+        return changed
+
+    def _refresh(self, obstacle: Obstacle) -> NDArray[np.int32]:
+        reach = max(mode.radius for mode in self.modes)
+        corner = np.array(obstacle.polygon)
+        low, high = corner.min(axis=0) - reach, corner.max(axis=0) + reach
+        nodes, ends = self.nodes(), self.graph.ends()
+        a, b = nodes[ends[:, 0]], nodes[ends[:, 1]]
+        touched = np.flatnonzero(
+            np.all((np.minimum(a, b) <= high) & (np.maximum(a, b) >= low), axis=1)
+        ).astype(np.int32)
+        return touched[self._price(touched, a[touched], b[touched])]
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """A mission's roadmap with its stops on it."""
+
+    roadmap: Roadmap
+    mode_of: Mapping[str, int]
+    """Mode of each robot."""
+    stops: dict[Point, int] = field(default_factory=dict)
+    """Node of each stop's and robot start's point."""
+
+
+def build(
+    mission: Mission, params: Params | None = None, seed: int = 0, *, relevant: frozenset[str]
+) -> World:
+    """Build a mission's roadmap, put every start and stop on it, and connect them.
+
+    `relevant` are the atoms that the rules speak of. Known obstacles are in, unknown ones are not.
+    """
+    params = params or Params()
+    modes: dict[Mode, int] = {}
+    mode_of = {
+        robot.id: modes.setdefault(Mode(mission.motions[robot.motion], robot.radius), len(modes))
+        for robot in mission.robots
+    }
+    rng = np.random.default_rng(seed)
+    workspace = Workspace(mission.map)
+    zones = Zones(mission.map.bounds, mission.zones, mission.places, relevant)
+    around = _mission_corners(mission, workspace, list(modes), params)
+    roadmap = Roadmap(workspace, zones, list(modes), params, rng, corner_points=around)
+    world = World(roadmap, mode_of)
+    wanted: dict[int, set[int]] = {m: set() for m in modes.values()}
+    for robot in mission.robots:
+        world.stops[robot.start] = roadmap.insert(robot.start)
+        wanted[mode_of[robot.id]].add(world.stops[robot.start])
+    for task in mission.tasks:
+        for stop in task.stops:
+            world.stops[stop.at] = roadmap.insert(stop.at)
+            for robot in mission.robots:
+                if task.type in robot.can:
+                    wanted[mode_of[robot.id]].add(world.stops[stop.at])
+    roadmap.connect({m: sorted(nodes) for m, nodes in wanted.items()})
+    return world
+
+
+def _mission_corners(
+    mission: Mission, workspace: Workspace, modes: Sequence[Mode], params: Params
+) -> Array:
+    if not params.corners:
+        return np.empty((0, 2))
+    obstacles = workspace.obstacles.values()
+    parts = [
+        corners(mission.map, obstacles, radius + params.margin, 2 * radius)
+        for radius in sorted({mode.radius for mode in modes})
+    ]
+    return np.concatenate(parts)
+
+
+def _delaunay_edges(nodes: Array) -> NDArray[np.int64]:
+    """Every edge (m, 2) of the Delaunay triangulation once, hull edges included."""
+    try:
+        triangles = Delaunay(nodes).simplices.astype(np.int64)
+    except (QhullError, ValueError):  # fewer than three points, or all on a line
+        order = np.lexsort(nodes.T)
+        return np.stack([order[:-1], order[1:]], axis=1)
+    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    return _unique(pairs, len(nodes))
+
+
+def _unique(pairs: NDArray[np.int64], n: int) -> NDArray[np.int64]:
+    """Undirected pairs (m, 2) of n nodes, each once and sorted."""
+    codes = np.unique(pairs.min(axis=1) * n + pairs.max(axis=1))
+    return np.stack(np.divmod(codes, n), axis=1)
+
+
+def _along_curve(nodes: Array) -> NDArray[np.intp]:
+    """Order nodes along a Z-curve, so that neighbours on the map are neighbours in memory."""
+    if not len(nodes):
+        return np.empty(0, dtype=np.intp)
+    low = nodes.min(axis=0)
+    size = max(float((nodes.max(axis=0) - low).max()), 1e-9)
+    cells = ((nodes - low) / size * 0xFFFF).astype(np.uint64)
+    for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
+        cells = (cells | (cells << np.uint64(shift))) & np.uint64(mask)
+    return np.argsort(cells[:, 0] | (cells[:, 1] << np.uint64(1)), kind="stable")
