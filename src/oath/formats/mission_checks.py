@@ -234,7 +234,7 @@ def _check_stops(
 def _tightness(hit: tuple[float, str], robot: Robot) -> str:
     clearance, what = hit
     if clearance <= 0:
-        return f"lies inside {what} (clearance 0 m, needed {robot.radius:g} m for {robot.id!r})"
+        return f"lies in {what} (clearance 0 m, needed {robot.radius:g} m for {robot.id!r})"
     return (
         f"is too close to {what}: "
         f"clearance {clearance:.6g} m is below the radius {robot.radius:g} m of robot {robot.id!r}"
