@@ -1,0 +1,214 @@
+"""Plans of routes on the roadmap, repaired when it changes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely import LineString
+from shapely import Polygon as ShapelyPolygon
+
+from oath import _core
+from oath.model import Obstacle, Point
+from oath.motion.mission_automaton import Letter, RouteAutomaton, Rules
+from oath.world.roadmap import Roadmap
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Service:
+    """A stop of a route as the planner sees it: where, its own atom, what serving it makes true."""
+
+    at: Point
+    own: str
+    letter: Letter = frozenset()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """What remains of a route as waypoints on the roadmap.
+
+    `legs` holds the waypoints (n, 2) [m] of every leg, from where the last one ended to its stop;
+    `length` is their sum [m]. If there is no way, `blocked` is the index of the stop that cannot be
+    reached (or not without breaking a rule), and there are no legs.
+    """
+
+    length: float
+    legs: tuple[Array, ...]
+    blocked: int | None = None
+
+
+class Planner:
+    """Plans one robot's routes, one after another, and keeps track of the rules on the way.
+
+    Parameters
+    ----------
+    roadmap, rules
+        Shared by all robots; the roadmap may change, the rules may not.
+    mode
+        The robot's mode of travel on the roadmap.
+    at
+        Where the robot starts [m].
+    """
+
+    def __init__(self, roadmap: Roadmap, rules: Rules, mode: int, at: Point) -> None:
+        self.roadmap, self.rules, self.mode = roadmap, rules, mode
+        self.position = at
+        self._states = frozenset(rules.automaton.initial)
+        self._services: tuple[Service, ...] = ()
+        self._core: _core.Planner | None = None
+        self._labels_known = 0
+        self._leg = 0
+        self._pending: list[NDArray[np.int32]] = []
+        self._plan = Plan(length=0.0, legs=())
+
+    def begin(self, at: Point, services: Sequence[Service]) -> Plan:
+        """Plan a new route from a point [m]; a robot on the move names where the move ends."""
+        self._services, self._core, self._leg = tuple(services), None, 0
+        return self.replan(at)
+
+    def replan(self, at: Point) -> Plan:
+        """Repair the plan of what remains of the route, from a point [m]."""
+        core = self._searcher()
+        states = self._after_driving_to(at)
+        flags = [int(q in states) for q in range(self.rules.automaton.states)]
+        nodes, costs, labels = self.roadmap.links(at, self.mode)
+        if len(self.roadmap.zones.classes) > self._labels_known:
+            core = self._searcher()
+        core.start(self._leg, at[0], at[1], nodes, costs, labels, flags)
+        if self._pending:
+            core.changed(np.concatenate(self._pending).tolist())
+            self._pending.clear()
+        reached = bool(states) and core.plan() < _core.UNREACHABLE
+        if reached:
+            self._plan = self._waypoints(core.path(), at)
+        else:
+            blocked = max(core.blocked, self._leg)
+            self._plan = Plan(length=0.0, legs=(), blocked=blocked)
+        return self._plan
+
+    def update(self, edges: NDArray[np.int32]) -> None:
+        """Note edges whose cost changed; the next `replan` repairs what they touch."""
+        if self._core is not None and len(edges):
+            self._pending.append(edges)
+
+    def touches(self, obstacle: Obstacle) -> bool:
+        """Whether what remains of the plan comes too near to an obstacle that blocks the robot."""
+        mode = self.roadmap.modes[self.mode]
+        if mode.motion.blocked_by(obstacle.kind):
+            polygon, reach = ShapelyPolygon(obstacle.polygon), mode.radius
+        elif obstacle.kind in mode.motion.cost:
+            polygon, reach = ShapelyPolygon(obstacle.polygon), 0.0
+        else:
+            return False
+        lines = [LineString(leg) for leg in self._plan.legs if len(leg) > 1]
+        return any(line.distance(polygon) <= reach for line in lines)
+
+    def leg(self) -> list[Point]:
+        """The current leg's waypoints [m] after string pulling, the start left out.
+
+        Every edge of the roadmap path stays one waypoint; pulling moves it onto the straight line.
+        """
+        way = _distinct(self._plan.legs[0])
+        pulled = self._pull(way)
+        self._plan = Plan(
+            length=self._plan.length, legs=(pulled, *self._plan.legs[1:]), blocked=None
+        )
+        points = [(float(x), float(y)) for x, y in pulled[1:]]
+        if points:
+            points[-1] = self._services[self._leg].at
+        return points
+
+    def moved(self, to: Point) -> None:
+        """The robot drove straight from where it was to a point [m]."""
+        self._states = self._after_driving_to(to)
+        self.position = to
+
+    def served(self) -> None:
+        """The robot served the current leg's stop."""
+        service = self._services[self._leg]
+        self._states = self.rules.step(self._states, service.letter)
+        self._leg += 1
+        self._plan = Plan(length=self._plan.length, legs=self._plan.legs[1:])
+
+    # -- inside
+
+    def _after_driving_to(self, at: Point) -> frozenset[int]:
+        if at == self.position:
+            return self._states
+        zones = self.roadmap.zones
+        label = zones.labels(np.array([self.position]), np.array([at]))[0]
+        return self.rules.step(self._states, zones.classes[label])
+
+    def _searcher(self) -> _core.Planner:
+        """The search of the current route, made anew when labels occur that it does not know."""
+        classes = self.roadmap.zones.classes
+        if self._core is None or len(classes) > self._labels_known:
+            targets = [self.roadmap.insert(service.at) for service in self._services]
+            automaton = RouteAutomaton(self.rules, [(s.own, s.letter) for s in self._services])
+            last = self._services[-1].at if self._services else self.position
+            self._core = _core.Planner(
+                self.roadmap.graph,
+                self.mode,
+                automaton.drive(classes),
+                targets,
+                automaton.serve(),
+                automaton.settled(self.roadmap.zones.at(last)),
+            )
+            self._labels_known = len(classes)
+            self._pending.clear()
+        return self._core
+
+    def _waypoints(self, path: NDArray[np.int32], at: Point) -> Plan:
+        nodes = self.roadmap.nodes()
+        legs, way = [], [np.array(at, dtype=float)]
+        for _, node, _ in path.tolist():
+            if node >= 0:
+                way.append(nodes[node])
+            else:
+                legs.append(np.array(way))
+                way = way[-1:]
+        length = sum(float(np.hypot(*np.diff(leg, axis=0).T).sum()) for leg in legs)
+        return Plan(length=length, legs=tuple(legs))
+
+    def _pull(self, way: Array) -> Array:
+        labels = self.roadmap.zones.labels(way[:-1], way[1:])
+        # Only stretches that touch no zone are pulled: the letters stay what was planned.
+        cuts = [0, *(np.flatnonzero(np.diff(labels) != 0) + 1).tolist(), len(labels)]
+        parts = [way[:1]]
+        for first, last in zip(cuts, cuts[1:], strict=False):
+            part = way[first : last + 1]
+            if first < last and labels[first] == 0:
+                part = self._straighten(part)
+            parts.append(part[1:])
+        return np.concatenate(parts)
+
+    def _straighten(self, way: Array) -> Array:
+        workspace, zones = self.roadmap.workspace, self.roadmap.zones
+        mode = self.roadmap.modes[self.mode]
+        kept = _core.pull(
+            np.ascontiguousarray(way),
+            workspace.core,
+            mode.radius,
+            workspace.blocked(mode.motion),
+            workspace.costly(mode.motion),
+            zones.core,
+            zones.all,
+        )
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))])
+        out = way.copy()
+        for first, last in zip(kept, kept[1:], strict=False):
+            span = along[last] - along[first]
+            share = (along[first + 1 : last] - along[first]) / span
+            out[first + 1 : last] = way[first] + share[:, None] * (way[last] - way[first])
+        return out
+
+
+def _distinct(way: Array) -> Array:
+    """Leave out waypoints that repeat the one before."""
+    keep = np.ones(len(way), dtype=np.bool_)
+    keep[1:] = np.any(np.diff(way, axis=0) != 0, axis=1)
+    return way[keep]
