@@ -175,7 +175,7 @@ def polygon(value: object) -> Polygon:
     if len(set(corners)) < 3:
         raise wrong(f"{show(value)} has fewer than 3 distinct corners", "give 3 corners or more")
     shape = shapely.Polygon(corners)
-    if shape.area < SMALLEST**2:
+    if shape.convex_hull.area < SMALLEST**2:
         raise wrong(f"{show(value)} has no area", "give corners that are not on one line")
     if not shape.is_valid:
         reason = shapely.is_valid_reason(shape).replace("[", " at [")

@@ -185,10 +185,10 @@ def _bounds(
     x_min, y_min, x_max, y_max = section.bounds
     excess = max(whole[0] - x_min, whole[1] - y_min, x_max - whole[2], y_max - whole[3])
     if excess > slack:
-        limits = ", ".join(f"{limit:g}" for limit in whole)
+        given, limits = (", ".join(f"{x:g}" for x in box) for box in (section.bounds, whole))
         raise document.error(
             ("map", "bounds"),
-            f"bounds {show(list(section.bounds))} reach beyond the map file's [{limits}]",
+            f"bounds [{given}] reach beyond the map file's [{limits}]",
             remedy="shrink them, or leave them out to use the whole map",
         )
     return section.bounds

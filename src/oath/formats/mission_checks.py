@@ -212,7 +212,7 @@ def _check_stops(
 ) -> None:
     """Check that one able robot fits at all stops: it is one robot that serves a task."""
     hits: list[tuple[Robot, Stop, tuple[float, str]]] = []
-    for robot in {(r.motion, r.radius): r for r in reversed(able)}.values():
+    for robot in _bodies(able):
         motion = mission.motions[robot.motion]
         for stop in task.stops:
             hit = surroundings.nearest(stop.at, motion, robot.radius, unknown=False)
@@ -229,6 +229,14 @@ def _check_stops(
         f"task {task.id!r}: {stop.name} {at} {_tightness(hit, robot)}{others}",
         remedy="move the stop away from it, or give the task to a smaller robot",
     )
+
+
+def _bodies(robots: Sequence[Robot]) -> list[Robot]:
+    """Return the first robot of every motion and radius: the others fit where it fits."""
+    first: dict[tuple[str, float], Robot] = {}
+    for robot in robots:
+        first.setdefault((robot.motion, robot.radius), robot)
+    return list(first.values())
 
 
 def _tightness(hit: tuple[float, str], robot: Robot) -> str:

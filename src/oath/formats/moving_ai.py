@@ -31,6 +31,8 @@ def read(path: Path) -> OccupancyGrid:
     """
     file = str(path)
     lines = read_bytes(path).replace(b"\r\n", b"\n").split(b"\n")
+    while lines and not lines[-1].strip():
+        lines.pop()
     height, width = _header(lines[:4], file)
     rows = lines[4 : 4 + height]
     for number, row in enumerate(rows, start=5):
@@ -40,10 +42,9 @@ def read(path: Path) -> OccupancyGrid:
                 file=f"{file}:{number}",
                 remedy="correct the row or the width",
             )
-    if len(rows) < height or any(line.strip() for line in lines[4 + height :]):
-        given = len(rows) + sum(1 for line in lines[4 + height :] if line.strip())
+    if len(lines) != 4 + height:
         raise BadInput(
-            f"map has {given} rows, the header says height {height}",
+            f"map has {len(lines) - 4} rows, the header says height {height}",
             file=file,
             field="height",
             remedy="correct the rows or the height",
