@@ -122,6 +122,7 @@ BAD = [
     (HEAD.replace("a.png", "."), "image", ["'.'", "no such file"], "relative"),
     (HEAD.replace("a.png", "junk.pgm"), "image", ["cannot be read"], "PGM"),
     (HEAD.replace("a.png", "short.pgm"), "image", ["cannot be read"], "PGM"),
+    (HEAD.replace("a.png", "long.pgm"), "image", ["3 bytes more", "10 x 10"], "PGM"),
     (HEAD.replace("a.png", "flat.pgm"), "image", ["cannot be read"], "PGM"),
     (HEAD.replace("a.png", "huge.pgm"), "image", ["cannot be read", "pixels"], "PGM"),
     (HEAD.replace("a.png", "vast.pgm"), "image", ["cannot be read"], "PGM"),
@@ -133,6 +134,7 @@ BAD = [
 def test_bad_maps(text: str, field: str, parts: list[str], remedy: str, tmp_path: Path) -> None:
     (tmp_path / "junk.pgm").write_bytes(bytes(range(256)))
     (tmp_path / "short.pgm").write_bytes(b"P5 10 10 255\n" + b"\0" * 99)
+    (tmp_path / "long.pgm").write_bytes(b"P5 10 10 255\n" + b"\0" * 103)
     (tmp_path / "flat.pgm").write_bytes(b"P5 0 10 255\n")
     (tmp_path / "huge.pgm").write_bytes(b"P5 13000 13000 255\n")
     (tmp_path / "vast.pgm").write_bytes(b"P5 1000000 1000000 255\n")

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageFile
 from pydantic import BeforeValidator, PlainValidator
 
 from oath.formats.fields import (
@@ -118,6 +118,7 @@ def _pixels(document: Document, path: Path) -> NDArray[np.generic]:
             # Pillow warns of large pictures; the limit here is on the size, below.
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             with Image.open(path, formats=PICTURES) as picture:
+                _check_length(picture, path.stat().st_size)
                 return _decoded(picture)
     except Exception as error:  # Pillow's decoders fail in many ways on broken files
         reason = str(error) or type(error).__name__
@@ -126,6 +127,15 @@ def _pixels(document: Document, path: Path) -> NDArray[np.generic]:
             f"image {path} cannot be read ({reason})",
             remedy="save it again as an 8-bit PGM or PNG",
         ) from None
+
+
+def _check_length(picture: ImageFile.ImageFile, length: int) -> None:
+    """Refuse a PGM with more pixels than its header says: the rows would be cut at wrong places."""
+    if picture.format == "PPM" and picture.mode == "L" and picture.tile[0].codec_name == "raw":
+        excess = length - picture.tile[0].offset - picture.width * picture.height
+        if excess > 2:  # some writers end the file with a line break
+            size = f"{picture.width} x {picture.height}"
+            raise ValueError(f"it holds {excess} bytes more than the {size} pixels of its header")
 
 
 def _decoded(picture: Image.Image) -> NDArray[np.generic]:
