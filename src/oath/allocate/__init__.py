@@ -1,1 +1,53 @@
-"""Who does what, in which order."""
+"""Who does what, in which order.
+
+`Problem` is what is asked, `Allocator` who answers, `checked` asks and checks the answer. The
+paper's three stages are `clustering`, `auction` and `selection`; `Oath` puts them together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from oath.allocate.contract import Allocator, Budget, checked, reasons
+from oath.allocate.oath import Oath
+from oath.allocate.problem import WAITING, Problem
+from oath.allocate.rounds import plan_all, urgent
+from oath.errors import BadInput, did_you_mean
+
+__all__ = [
+    "ALLOCATORS",
+    "WAITING",
+    "Allocator",
+    "Budget",
+    "Oath",
+    "Problem",
+    "allocator",
+    "checked",
+    "plan_all",
+    "reasons",
+    "urgent",
+]
+
+ALLOCATORS: dict[str, Callable[[], Allocator]] = {"oath": Oath}
+"""Every allocator by its name, with its default parameters."""
+
+
+def allocator(name: str) -> Allocator:
+    """Return a new allocator by its name.
+
+    Raises
+    ------
+    BadInput
+        Nobody has this name.
+
+    Examples
+    --------
+    >>> allocator("oath")
+    Oath(params=Params(clusters=None, elbow=False, theta=1.0, linkage='average', method='dp'))
+    >>> allocator("oaht")
+    Traceback (most recent call last):
+    oath.errors.BadInput: unknown allocator 'oaht'; did you mean 'oath'?
+    """
+    if name not in ALLOCATORS:
+        raise BadInput(f"unknown allocator '{name}'", remedy=did_you_mean(name, list(ALLOCATORS)))
+    return ALLOCATORS[name]()

@@ -48,12 +48,13 @@ class Problem:
     """(R,) the robot still has a route; `routes` says which."""
     routes: tuple[Route, ...]
     """(R,) what each robot is doing now; its tasks that are not picked up stand in `tasks` too."""
+    types: tuple[str, ...] = ()
+    """(T,) the types' names, for messages only."""
 
     def feasible(self) -> NDArray[np.bool_]:
         """(R, P): the robot can do the type, has room, reaches pickup and from there delivery."""
-        cost = self.cost[self.mode]  # (R, L, L)
-        r = np.arange(len(self.robots))
-        there = np.isfinite(cost[r[:, None], self.start[:, None], self.pickup[None, :]])
-        on = np.isfinite(cost[:, self.pickup, self.delivery])
-        room = (self.capacity[:, None] > 0) | self.visit[None, :]
-        return there & on & room & (self.capability[:, self.type] > 0)
+        there = np.isfinite(self.cost[self.mode[:, None], self.start[:, None], self.pickup])
+        on = np.isfinite(self.cost[:, self.pickup, self.delivery])[self.mode]
+        room = (self.capacity[:, None] > 0) | self.visit
+        able: NDArray[np.bool_] = there & on & room & (self.capability[:, self.type] > 0)
+        return able

@@ -1,0 +1,154 @@
+"""Assignments beyond one round: all tasks at once, and tasks that cannot wait."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from oath.allocate.contract import (
+    Allocator,
+    Budget,
+    checked,
+    reasons,
+    stop_location,
+    stop_names,
+    to_route,
+)
+from oath.allocate.problem import Problem
+from oath.model import Assignment, Route, RouteStop
+
+
+@dataclass(slots=True)
+class _Fleet:
+    """Where and when each robot will be free, as a plan grows."""
+
+    problem: Problem
+    at: NDArray[np.int32]
+    """(R,) location."""
+    time: NDArray[np.float64]
+    """(R,) [s] from now."""
+
+    @staticmethod
+    def now(problem: Problem) -> _Fleet:
+        return _Fleet(problem, problem.start.copy(), np.zeros(len(problem.robots)))
+
+    def serve(self, robot: int, task: int, stop: str) -> None:
+        """Send a robot to a stop of a task and let it work there."""
+        problem, there = self.problem, stop_location(self.problem, task, stop)
+        travel = problem.cost[problem.mode[robot], self.at[robot], there]
+        self.time[robot] += travel / problem.speed[robot] + problem.service_time[task]
+        self.at[robot] = there
+
+
+def plan_all(
+    problem: Problem, allocator: Allocator, budget: Budget, rng: np.random.Generator
+) -> Assignment:
+    """Assign all tasks, round by round as a mission would: whenever a robot becomes idle.
+
+    Travel takes cost / speed, each stop its service time. Every round sees all robots, from where
+    their routes end; those still under way are busy. An allocator that assigns everything at once
+    needs one round only. Robots that are busy from the start keep their routes and get nothing.
+
+    Returns
+    -------
+    Assignment
+        The concatenated routes. A task stays unassigned only if no robot that was idle at the start
+        can do it.
+
+    Raises
+    ------
+    ProviderError
+        The allocator broke its contract in some round.
+    """
+    index = {task: i for i, task in enumerate(problem.tasks)}
+    fleet = _Fleet.now(problem)
+    fleet.time[problem.busy] = np.inf
+    kept = {stop.task for route in problem.routes for stop in route}
+    left = [i for i, task in enumerate(problem.tasks) if task not in kept]
+    total: list[list[RouteStop]] = [list(route) for route in problem.routes]
+    latest: list[Route] = list(problem.routes)
+    clock = 0.0
+    while left:
+        busy = fleet.time > clock
+        fleet.time = np.maximum(fleet.time, clock)  # the idle ones begin now
+        latest = [route if on else () for route, on in zip(latest, busy, strict=True)]
+        answer = checked(allocator, _rest(problem, left, fleet, busy, latest), budget, rng)
+        new = [_new(answer.routes[robot], index, left) for robot in problem.robots]
+        for robot, route in enumerate(new):
+            for stop in route:
+                fleet.serve(robot, index[stop.task], stop.stop)
+            total[robot] += route
+            latest[robot] += route
+        taken = {index[stop.task] for route in new for stop in route}
+        left = [task for task in left if task not in taken]
+        # A robot that stood at its stops already is idle again now, hence not only later times.
+        served = np.array([bool(route) for route in new], dtype=np.bool_)
+        ends = fleet.time[((fleet.time > clock) | served) & np.isfinite(fleet.time)]
+        if ends.size:
+            clock = float(ends.min())
+        elif not taken:
+            break  # everyone is idle, and nobody can do what is left
+    routes = {robot: tuple(total[r]) for r, robot in enumerate(problem.robots)}
+    return Assignment(routes=routes, unassigned=reasons(problem, left))
+
+
+def _rest(
+    problem: Problem, left: list[int], fleet: _Fleet, busy: NDArray[np.bool_], routes: list[Route]
+) -> Problem:
+    """Return what is left to assign; tasks in routes count as carried, so they stay there."""
+    return replace(
+        problem,
+        tasks=tuple(problem.tasks[task] for task in left),
+        start=fleet.at.copy(),
+        pickup=problem.pickup[left],
+        delivery=problem.delivery[left],
+        visit=problem.visit[left],
+        service_time=problem.service_time[left],
+        type=problem.type[left],
+        busy=busy,
+        routes=tuple(routes),
+    )
+
+
+def _new(route: Route, index: dict[str, int], left: list[int]) -> Route:
+    open_ = set(left)
+    return tuple(stop for stop in route if index.get(stop.task) in open_)
+
+
+def urgent(problem: Problem, tasks: list[int]) -> Assignment:
+    """Give each task to the robot that completes it soonest, before anything else that it does.
+
+    Tasks are handled in the order of their indices; a robot that got one is free again where and
+    when that one ends. Each is done on its own, so a robot needs room for one.
+
+    Parameters
+    ----------
+    tasks
+        Indices of the tasks that cannot wait.
+
+    Returns
+    -------
+    Assignment
+        Routes to put before those of the other tasks, and why a task could not be given to anyone.
+        Tasks that are not asked for are in neither.
+    """
+    fleet = _Fleet.now(problem)
+    able = problem.feasible()
+    routes: dict[str, Route] = dict.fromkeys(problem.robots, ())
+    missed = []
+    for task in sorted(tasks):
+        pickup, delivery = problem.pickup[task], problem.delivery[task]
+        to_pickup = problem.cost[problem.mode, fleet.at, pickup]
+        on = problem.cost[problem.mode, pickup, delivery] * (not problem.visit[task])
+        end = np.where(able[:, task], fleet.time + (to_pickup + on) / problem.speed, np.inf)
+        robot = int(np.argmin(end)) if end.size else -1
+        if robot < 0 or not np.isfinite(end[robot]):
+            missed.append(task)
+            continue
+        names = stop_names(problem, task)
+        for name in names:
+            fleet.serve(robot, task, name)
+        routes[problem.robots[robot]] += to_route(problem, [(task, name) for name in names])
+    return Assignment(routes=routes, unassigned=reasons(problem, missed))
