@@ -278,7 +278,7 @@ def _draw_drives(
         look, where = looks[robot.id], _aside(sheet, i, len(mission.robots))
         # All the white borders lie below all the lines, so no line hides another one's.
         road = _roads([robot.start, *(move.to for move in moves)])
-        border: Style = {"color": "white", "lw": width + 2, "solid_joinstyle": "round"}
+        border: Style = {"color": "white", "lw": width + 1.4, "alpha": 0.85}
         sheet.axes.plot(*road.T, **border, transform=where, zorder=5.5)
         line: Style = {"color": look["color"], "ls": look["linestyle"], "lw": width}
         sheet.axes.plot(*road.T, **line, solid_joinstyle="round", transform=where, zorder=6)
