@@ -1,1 +1,113 @@
-"""OATH: task assignment and planning for mixed robot fleets among obstacles."""
+"""OATH: task assignment and planning for mixed robot fleets among obstacles.
+
+Examples
+--------
+>>> import oath
+>>> mission = oath.load("missions/maze-09.yaml")
+>>> result = oath.run(mission, seed=7)
+>>> result.summary["completed"], len(result.summary["unserved"])
+(9, 0)
+>>> oath.allocate(mission).unassigned
+{}
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from oath.events import AnyEvent
+    from oath.model import Assignment, Mission
+    from oath.runtime import Result
+
+__all__ = ["DEFAULT_ALLOCATOR", "allocate", "load", "run"]
+
+DEFAULT_ALLOCATOR = "oath"
+
+# The rooms are imported when they are needed: `import oath` itself costs next to nothing.
+
+
+def load(path: str | Path) -> Mission:
+    """Read a mission file.
+
+    Raises
+    ------
+    BadInput
+        Naming file, field, value, limit and remedy.
+    """
+    from oath.formats.mission import load as read
+
+    return read(path)
+
+
+def run(
+    mission: Mission,
+    *,
+    allocator: str = DEFAULT_ALLOCATOR,
+    seed: int = 0,
+    points: int = 1000,
+    on_event: Callable[[AnyEvent], None] = lambda event: None,
+) -> Result:
+    """Run a mission in the built-in simulator, to its end.
+
+    Parameters
+    ----------
+    mission
+        What to do, from `load`.
+    allocator
+        Name of the allocator.
+    seed
+        Of the roadmap and the allocator: the same seed gives the same events, wall clock aside.
+    points
+        Sampled points of the roadmap.
+    on_event
+        Called with every event as it happens.
+
+    Returns
+    -------
+    Result
+        `summary` and `events`; a task that could not be done stands in `summary["unserved"]`.
+
+    Raises
+    ------
+    BadInput
+        If a rule is wrong or a stop is out of reach of every capable robot.
+    """
+    from oath import runtime
+    from oath.allocate import Budget
+    from oath.allocate import allocator as named
+    from oath.fleet.sim import SimFleet
+    from oath.world.roadmap import Params
+
+    chosen = named(allocator)
+    scene = runtime.prepare(mission, Params(points=points), seed)
+    runtime.require_reachable(scene)
+    return runtime.Runtime(
+        scene,
+        SimFleet(mission),
+        name=allocator,
+        allocator=chosen,
+        budget=Budget(),
+        seed=seed,
+        on_event=on_event,
+    ).run()
+
+
+def allocate(
+    mission: Mission, *, allocator: str = DEFAULT_ALLOCATOR, seed: int = 0, points: int = 2000
+) -> Assignment:
+    """Assign all tasks of a mission at once, without executing anything.
+
+    Parameters and errors as for `run`.
+    """
+    from oath import runtime
+    from oath.allocate import Budget
+    from oath.allocate import allocator as named
+    from oath.world.roadmap import Params
+
+    chosen = named(allocator)
+    scene = runtime.prepare(mission, Params(points=points), seed)
+    runtime.require_reachable(scene)
+    return runtime.assign(scene, chosen, Budget(), seed).assignment

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Annotated
 
 import numpy
+import numpy.typing
 from numpy.typing import NDArray
 
 
@@ -128,4 +129,40 @@ class Planner:
 def pull(path: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], workspace: Workspace, radius: float, blocked: Sequence[int], costly: Sequence[int], zones: Workspace, labelled: Sequence[int]) -> NDArray[numpy.int32]:
     """
     Indices of the points of a path (n, 2) that remain after string pulling. Shortcuts keep the radius from the blocked kinds and touch no costly kind and no labelled zone.
+    """
+
+def select_tasks(cost: numpy.typing.NDArray[numpy.float64], start: int, first: numpy.typing.NDArray[numpy.int32], last: numpy.typing.NDArray[numpy.int32], visit: numpy.typing.NDArray[numpy.bool_], take: int, capacity: int, work: int = 200000000) -> tuple[numpy.typing.NDArray[numpy.int32], float, bool]:
+    """
+    Choose tasks and the shortest open pickup-and-delivery order, by dynamic programming.
+
+    Parameters
+    ----------
+    cost
+        (L, L) travel cost [m], row = from; inf = unreachable. Need not be symmetric.
+    start
+        Location of the robot.
+    first, last
+        (n,) locations of the tasks' first and last stops; n <= 32.
+    visit
+        (n,) the task has only its first stop and loads nothing.
+    take
+        Number of tasks to take, cut to n.
+    capacity
+        Tasks carried at once.
+    work
+        Additions that the wide pass may spend; about 1e9 take a second.
+
+    Returns
+    -------
+    order
+        Stops in order: i is task i's first stop, n + i its last; empty if `take` tasks cannot be done.
+    length
+        Length of the path [m]; inf if there is none.
+    exact
+        Whether the path is proven to be shortest. The same input always gives the same answer.
+
+    Raises
+    ------
+    ValueError
+        More than 32 tasks, a location outside of `cost`, a negative or NaN cost.
     """

@@ -65,7 +65,7 @@ class Motion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robot:
-    """One robot: start [m], capacity (tasks carried at once), speed [m/s], radius and sensing [m]."""
+    """One robot: start [m], capacity (tasks at once), speed [m/s], radius and sensing range [m]."""
 
     id: str
     start: Point

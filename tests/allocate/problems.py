@@ -44,6 +44,8 @@ def line(
         busy=np.zeros(r, dtype=np.bool_),
         routes=((),) * r,
         types=tuple("abcdefg"[: len(capability[0]) if r else 1]),
+        priority=np.zeros(p, dtype=np.int8),
+        refused=np.zeros((r, p), dtype=np.bool_),
     )
 
 
@@ -87,4 +89,7 @@ def problems(draw: st.DrawFn, *, robots: int = 4, tasks: int = 12, wild: bool = 
         mode=rng.integers(0, m, r).astype(np.int32),
         busy=np.zeros(r, dtype=np.bool_),
         routes=((),) * r,
+        types=tuple("abc"[:t]),
+        priority=np.zeros(p, dtype=np.int8),
+        refused=np.zeros((r, p), dtype=np.bool_),
     )

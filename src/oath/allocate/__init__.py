@@ -10,8 +10,9 @@ from collections.abc import Callable
 
 from oath.allocate.contract import Allocator, Budget, checked, reasons
 from oath.allocate.oath import Oath
+from oath.allocate.priority import ByPriority
 from oath.allocate.problem import WAITING, Problem
-from oath.allocate.rounds import plan_all, urgent
+from oath.allocate.rounds import plan_all, route_length, urgent
 from oath.errors import BadInput, did_you_mean
 
 __all__ = [
@@ -19,12 +20,14 @@ __all__ = [
     "WAITING",
     "Allocator",
     "Budget",
+    "ByPriority",
     "Oath",
     "Problem",
     "allocator",
     "checked",
     "plan_all",
     "reasons",
+    "route_length",
     "urgent",
 ]
 

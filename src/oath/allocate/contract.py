@@ -76,7 +76,10 @@ def _why_not(problem: Problem, task: int) -> str:
     able = able[np.isfinite(problem.cost[problem.mode[able], pickup, delivery])]
     if not able.size:
         return "no capable robot reaches its delivery"
-    return "no room: the robots that could take it are full"
+    able = able[(problem.capacity[able] > 0) | problem.visit[task]]
+    if not able.size:
+        return "no room: the robots that could take it are full"
+    return "every robot that could take it would break a rule"
 
 
 def checked(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,8 +49,12 @@ class Problem:
     """(R,) the robot still has a route; `routes` says which."""
     routes: tuple[Route, ...]
     """(R,) what each robot is doing now; its tasks that are not picked up stand in `tasks` too."""
-    types: tuple[str, ...] = ()
+    types: tuple[str, ...]
     """(T,) the types' names, for messages only."""
+    priority: NDArray[np.int8]
+    """(P,) 1 = high, 0 = normal, -1 = low."""
+    refused: NDArray[np.bool_]
+    """(R, P) the robot was found unable to do the task, e.g. because a rule forbids it."""
 
     def feasible(self) -> NDArray[np.bool_]:
         """(R, P): the robot can do the type, has room, reaches pickup and from there delivery."""
@@ -57,4 +62,19 @@ class Problem:
         on = np.isfinite(self.cost[:, self.pickup, self.delivery])[self.mode]
         room = (self.capacity[:, None] > 0) | self.visit
         able: NDArray[np.bool_] = there & on & room & (self.capability[:, self.type] > 0)
-        return able
+        return able & ~self.refused
+
+    def only(self, tasks: Sequence[int]) -> Problem:
+        """The same problem with some of its tasks only."""
+        kept = np.array(tasks, dtype=np.intp)
+        return replace(
+            self,
+            tasks=tuple(self.tasks[task] for task in tasks),
+            pickup=self.pickup[kept],
+            delivery=self.delivery[kept],
+            visit=self.visit[kept],
+            service_time=self.service_time[kept],
+            type=self.type[kept],
+            priority=self.priority[kept],
+            refused=self.refused[:, kept],
+        )

@@ -98,18 +98,7 @@ def _rest(
     problem: Problem, left: list[int], fleet: _Fleet, busy: NDArray[np.bool_], routes: list[Route]
 ) -> Problem:
     """Return what is left to assign; tasks in routes count as carried, so they stay there."""
-    return replace(
-        problem,
-        tasks=tuple(problem.tasks[task] for task in left),
-        start=fleet.at.copy(),
-        pickup=problem.pickup[left],
-        delivery=problem.delivery[left],
-        visit=problem.visit[left],
-        service_time=problem.service_time[left],
-        type=problem.type[left],
-        busy=busy,
-        routes=tuple(routes),
-    )
+    return replace(problem.only(left), start=fleet.at.copy(), busy=busy, routes=tuple(routes))
 
 
 def _new(route: Route, index: dict[str, int], left: list[int]) -> Route:
@@ -152,3 +141,15 @@ def urgent(problem: Problem, tasks: list[int]) -> Assignment:
             fleet.serve(robot, task, name)
         routes[problem.robots[robot]] += to_route(problem, [(task, name) for name in names])
     return Assignment(routes=routes, unassigned=reasons(problem, missed))
+
+
+def route_length(problem: Problem, robot: int, route: Route) -> tuple[float, float]:
+    """Length [m] of a robot's route over the problem's tasks, and its time at the stops [s]."""
+    at, length, service = int(problem.start[robot]), 0.0, 0.0
+    for stop in route:
+        task = problem.tasks.index(stop.task)
+        there = stop_location(problem, task, stop.stop)
+        length += float(problem.cost[problem.mode[robot], at, there])
+        service += float(problem.service_time[task])
+        at = there
+    return length, service

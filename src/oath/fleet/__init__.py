@@ -1,1 +1,40 @@
 """Actions to robots, robots to events."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from oath.events import AnyEvent
+from oath.model import Point, StopName
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Order:
+    """Drive along waypoints [m], then serve a stop for some time [s]."""
+
+    path: tuple[Point, ...]
+    task: str
+    stop: StopName
+    service_time: float
+
+
+class Fleet(Protocol):
+    """Robots that take orders and report what happens.
+
+    Robots report each straight move (`Moved`), each served stop (`StopServed`) and each obstacle
+    that they find (`ObstacleFound`).
+    """
+
+    def send(self, robot: str, order: Order) -> None:
+        """Give a robot its next order; it begins where the robot comes to rest."""
+
+    def cancel(self, robot: str, *, at_once: bool) -> Point:
+        """Drop a robot's order; return where it comes to rest [m].
+
+        It stops `at_once`, mid-edge, or finishes its current move first.
+        """
+
+    def events(self) -> Sequence[AnyEvent]:
+        """Wait for what happens next; empty if nothing will happen without another order."""

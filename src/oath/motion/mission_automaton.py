@@ -1,8 +1,8 @@
 """Automata of routes: a chain built directly for the stops, times an automaton for the rules.
 
-A route is the formula F(s1 & F(s2 & ...)) & G !z1 & G !z2 ...: serve the stops in order, never touch
-what is to be avoided. Its automaton is a chain that needs no translation. Whatever else the rules
-ask for goes through the general translation once per mission.
+A route is the formula F(s1 & F(s2 & ...)) & G !z1 & G !z2 ...: serve the stops in order and never
+touch what is to be avoided. Its automaton is a chain that needs no translation. Whatever else the
+rules ask for goes through the general translation once per mission.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from oath.errors import BadInput
 from oath.motion.buchi import Automaton, Label, translate
-from oath.motion.ltl import Formula, atom, atoms, conjunction, invariants, parse
+from oath.motion.ltl import Formula, atoms, conjunction, invariants, parse
 
 Letter = frozenset[str]
 Table = NDArray[np.uint8]
@@ -34,7 +34,7 @@ class Rules:
     relevant: frozenset[str]
 
     def step(self, states: frozenset[int], letter: Letter) -> frozenset[int]:
-        """Where the automaton may be after one more letter; empty once a rule is broken for good."""
+        """Where the automaton may be after one more letter; empty once a rule is broken."""
         if letter & self.avoid:
             return frozenset()
         return frozenset(q for state in states for q in self.automaton.successors(state, letter))

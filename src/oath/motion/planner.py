@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +33,8 @@ class Plan:
     """What remains of a route as waypoints on the roadmap.
 
     `legs` holds the waypoints (n, 2) [m] of every leg, from where the last one ended to its stop;
-    `length` is their sum [m]. If there is no way, `blocked` is the index of the stop that cannot be
-    reached (or not without breaking a rule), and there are no legs.
+    `length` is their sum [m]. If there is no way, there are no legs, and `blocked` is the index
+    among the remaining stops of the one that cannot be reached (or only by breaking a rule).
     """
 
     length: float
@@ -86,7 +87,7 @@ class Planner:
         if reached:
             self._plan = self._waypoints(core.path(), at)
         else:
-            blocked = max(core.blocked, self._leg)
+            blocked = max(core.blocked - self._leg, 0)
             self._plan = Plan(length=0.0, legs=(), blocked=blocked)
         return self._plan
 
@@ -179,7 +180,7 @@ class Planner:
         # Only stretches that touch no zone are pulled: the letters stay what was planned.
         cuts = [0, *(np.flatnonzero(np.diff(labels) != 0) + 1).tolist(), len(labels)]
         parts = [way[:1]]
-        for first, last in zip(cuts, cuts[1:], strict=False):
+        for first, last in pairwise(cuts):
             part = way[first : last + 1]
             if first < last and labels[first] == 0:
                 part = self._straighten(part)
@@ -200,7 +201,7 @@ class Planner:
         )
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))])
         out = way.copy()
-        for first, last in zip(kept, kept[1:], strict=False):
+        for first, last in pairwise(kept.tolist()):
             span = along[last] - along[first]
             share = (along[first + 1 : last] - along[first]) / span
             out[first + 1 : last] = way[first] + share[:, None] * (way[last] - way[first])

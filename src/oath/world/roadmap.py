@@ -230,9 +230,10 @@ class Roadmap:
         while True:
             near = self.graph.nearest(at[0], at[1], look)
             a = np.repeat(at[None], len(near), axis=0)
-            seen = near[self.workspace.free(a, nodes[near], mode)][: self.params.links]
+            free = self.workspace.free(a, nodes[near], mode)
+            seen = np.asarray(near[free], dtype=np.intp)
             if len(seen) or look >= min(self.graph.size, 4096):
-                return seen.astype(np.intp)
+                return seen[: self.params.links]
             look *= 4
 
     def _sights(self, points: Array, nodes: NDArray[np.intp]) -> NDArray[np.int64]:

@@ -1,0 +1,443 @@
+"""The program `oath`. Results go to stdout, everything else to stderr.
+
+Exit codes: 0 ok, 1 the mission cannot be done or a check failed, 2 bad input.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+from collections.abc import Callable
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+import click
+
+from oath import DEFAULT_ALLOCATOR
+from oath.errors import OathError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from oath.events import AnyEvent
+    from oath.model import Mission
+
+CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
+
+
+class Program(click.Group):
+    """Turns errors into one line on stderr and an exit code."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; nothing reaches the user as a traceback."""
+        try:
+            return super().invoke(ctx)
+        except OathError as error:
+            click.echo(f"error: {error}", err=True)
+            ctx.exit(2)
+        except BrokenPipeError:
+            # Whoever read our output has seen enough; Python must not complain when it flushes.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            ctx.exit(1)
+        except OSError as error:
+            where = f"{error.filename}: " if error.filename else ""
+            click.echo(f"error: {where}{error.strerror or error}", err=True)
+            ctx.exit(2)
+
+
+def _examples(*lines: str) -> str:
+    return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)
+
+
+def _mission_argument(command: Callable[..., None]) -> Callable[..., None]:
+    return click.argument("mission", metavar="MISSION", type=click.Path(path_type=Path))(command)
+
+
+def _seed_option(command: Callable[..., None]) -> Callable[..., None]:
+    return click.option(
+        "--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Random seed."
+    )(command)
+
+
+def _json_option(command: Callable[..., None]) -> Callable[..., None]:
+    return click.option(
+        "--json", "as_json", is_flag=True, help="Print one JSON object and nothing else."
+    )(command)
+
+
+def _points_option(default: int) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    return click.option(
+        "--points",
+        default=default,
+        show_default=True,
+        type=click.IntRange(1, 1_000_000),
+        help="Sampled points of the roadmap.",
+    )
+
+
+def _allocator_option(command: Callable[..., None]) -> Callable[..., None]:
+    return click.option(
+        "--allocator", default=DEFAULT_ALLOCATOR, show_default=True, help="Who assigns the tasks."
+    )(command)
+
+
+def _print_json(value: object) -> None:
+    click.echo(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
+
+
+@click.group(cls=Program, context_settings=CONTEXT)
+@click.version_option(package_name="oath-fleet", prog_name="oath")
+def main() -> None:
+    """Assign tasks to a mixed robot fleet among obstacles, plan every motion, run the mission."""
+
+
+@main.command(
+    epilog=_examples(
+        "oath run missions/maze-25-gates.yaml --out out",
+        "oath run missions/office.yaml --seed 7 --json",
+    )
+)
+@_mission_argument
+@_allocator_option
+@_seed_option
+@_points_option(1000)
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for events.jsonl, summary.json and routes.png.",
+)
+@_json_option
+def run(
+    mission: Path, allocator: str, seed: int, points: int, out: Path | None, as_json: bool
+) -> None:
+    """Run a mission in the built-in simulator, to its last delivery."""
+    import oath
+
+    loaded = oath.load(mission)
+    with _recording(out, loaded) as journal, _progress(len(loaded.tasks)) as show:
+
+        def on_event(event: AnyEvent) -> None:
+            journal(event)
+            show(event)
+
+        result = oath.run(loaded, allocator=allocator, seed=seed, points=points, on_event=on_event)
+    if out is not None:
+        from oath.picture import draw_run
+
+        _write(out / "summary.json", json.dumps(result.summary, indent=2) + "\n")
+        roadmap = result.scene.world.roadmap
+        draw_run(
+            loaded,
+            result.events,
+            out / "routes.png",
+            nodes=roadmap.nodes(),
+            edges=roadmap.edges(),
+        )
+    if as_json:
+        _print_json(result.summary)
+    else:
+        _print_summary(result.summary, out)
+    if result.summary["unserved"]:
+        raise click.exceptions.Exit(1)
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a whole file or leave the old one."""
+    draft = path.with_name(path.name + ".part")
+    draft.write_text(text, encoding="utf-8")
+    draft.replace(path)
+
+
+@contextmanager
+def _recording(out: Path | None, mission: Mission) -> Iterator[Callable[[AnyEvent], None]]:
+    """Journal every event to events.jsonl, line by line: a run cut off leaves whole lines."""
+    if out is None:
+        yield lambda event: None
+        return
+    from oath.formats.event_log import to_line
+
+    draft = out / "events.jsonl.part"
+    file: IO[str] | None = None
+    count = 0
+
+    def write(event: AnyEvent) -> None:
+        nonlocal file, count
+        if file is None:  # only now: bad input must leave nothing behind
+            out.mkdir(parents=True, exist_ok=True)
+            file = draft.open("w", encoding="utf-8")
+        file.write(to_line(count, event).rstrip("\n") + "\n")
+        count += 1
+
+    try:
+        yield write
+    finally:
+        if file is not None:
+            file.close()
+    draft.replace(out / "events.jsonl")
+
+
+@contextmanager
+def _progress(tasks: int) -> Iterator[Callable[[AnyEvent], None]]:
+    """Show tasks done, the mission clock and the time left, on a terminal only."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    from oath.events import StopServed
+
+    console = Console(stderr=True)
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("tasks  mission clock {task.fields[clock]:.0f} s  left"),
+        TimeRemainingColumn(),
+        console=console,
+        disable=not console.is_terminal,
+        transient=True,
+    )
+    with bar:
+        job = bar.add_task("running", total=tasks, clock=0.0)
+
+        def show(event: AnyEvent) -> None:
+            done = isinstance(event, StopServed) and event.stop != "pickup"
+            bar.update(job, advance=int(done), clock=event.t)
+
+        yield show
+
+
+def _print_summary(summary: dict[str, Any], out: Path | None) -> None:
+    click.echo(
+        f"{summary['mission']}: {summary['completed']} of {summary['tasks']} tasks done by "
+        f"{summary['robots']} robots (allocator {summary['allocator']}, seed {summary['seed']})"
+    )
+    click.echo(
+        f"  driven {summary['total_distance']:.1f} m in {summary['total_steps']} steps, "
+        f"makespan {summary['makespan']:.1f} s"
+    )
+    click.echo(
+        f"  {summary['rounds']} rounds in {summary['allocation_seconds'] * 1e3:.0f} ms, "
+        f"{summary['replans']} replans, planning {summary['planning_seconds'] * 1e3:.0f} ms"
+    )
+    width = max(map(len, summary["per_robot"]))
+    for robot, numbers in summary["per_robot"].items():
+        click.echo(
+            f"  {robot:{width}}  {numbers['tasks']:3d} tasks  {numbers['distance']:7.1f} m"
+            f"  {numbers['steps']:4d} steps"
+        )
+    for task, reason in summary["unserved"].items():
+        click.echo(f"  not done: {task}: {reason}")
+    if out is not None:
+        click.echo(f"  see {out / 'routes.png'}, {out / 'summary.json'}, {out / 'events.jsonl'}")
+
+
+def _seconds(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
+    """Parse a duration such as 200ms or 1.5s [s]."""
+    if value is None:
+        return None
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*(ms|s)", value)
+    if not match:
+        raise click.BadParameter(f"'{value}' is no duration; write e.g. 200ms or 1.5s")
+    return float(match[1]) * (1e-3 if match[2] == "ms" else 1.0)
+
+
+@main.command(
+    epilog=_examples(
+        "oath plan missions/maze-25.yaml", "oath plan missions/maze-25.yaml --budget 200ms --json"
+    )
+)
+@_mission_argument
+@_allocator_option
+@click.option("--budget", callback=_seconds, help="Time to improve the answer: 200ms, 1.5s.")
+@_seed_option
+@_points_option(2000)
+@_json_option
+def plan(
+    mission: Path, allocator: str, budget: float | None, seed: int, points: int, as_json: bool
+) -> None:
+    """Assign all tasks once, without executing anything."""
+    import oath
+    from oath import runtime
+    from oath.allocate import Budget
+    from oath.allocate import allocator as named
+    from oath.world.roadmap import Params
+
+    loaded, chosen = oath.load(mission), named(allocator)
+    scene = runtime.prepare(loaded, Params(points=points), seed)
+    runtime.require_reachable(scene)
+    assigned = runtime.assign(scene, chosen, Budget(seconds=budget), seed)
+    assignment = assigned.assignment
+    report = {
+        "allocator": allocator,
+        "seconds": assigned.seconds,
+        "total_distance": assigned.total_distance,
+        "makespan": assigned.makespan,
+        "objective": assigned.total_distance + assigned.makespan,
+        "lower_bound": None,
+        "optimal": False,
+        "routes": {
+            robot: [
+                {
+                    "task": entry.task,
+                    "stop": entry.stop,
+                    "at": list(loaded.task(entry.task).stop(entry.stop).at),
+                }
+                for entry in route
+            ]
+            for robot, route in assignment.routes.items()
+        },
+        "unassigned": dict(assignment.unassigned),
+    }
+    if as_json:
+        _print_json(report)
+    else:
+        _print_plan(report)
+    if assignment.unassigned:
+        raise click.exceptions.Exit(1)
+
+
+def _print_plan(report: dict[str, Any]) -> None:
+    click.echo(
+        f"{report['allocator']}: {report['total_distance']:.1f} m in all, makespan "
+        f"{report['makespan']:.1f} s, found in {report['seconds'] * 1e3:.1f} ms"
+    )
+    signs = {"pickup": "+", "delivery": "-", "visit": ""}
+    for robot, route in report["routes"].items():
+        stops = " ".join(signs[entry["stop"]] + entry["task"] for entry in route)
+        click.echo(f"  {robot}: {stops or 'idle'}")
+    for task, reason in report["unassigned"].items():
+        click.echo(f"  unassigned: {task}: {reason}")
+    click.echo("  (+ picks up, - delivers)")
+
+
+@main.command(epilog=_examples("oath check missions/office.yaml"))
+@_mission_argument
+@_seed_option
+@_points_option(1000)
+@_json_option
+def check(mission: Path, seed: int, points: int, as_json: bool) -> None:
+    """Validate a mission and point out what will go wrong or looks odd."""
+    import oath
+    from oath import runtime
+    from oath.world.roadmap import Params
+
+    scene = runtime.prepare(oath.load(mission), Params(points=points), seed)
+    faults = [f"task '{task}': {why}" for task, why in runtime.unreachable(scene).items()]
+    warnings = runtime.lint(scene)
+    if as_json:
+        _print_json({"mission": scene.mission.name, "errors": faults, "warnings": warnings})
+    else:
+        for kind, lines in (("error", faults), ("warning", warnings)):
+            for line in lines:
+                click.echo(f"{kind}: {line}")
+        loaded = scene.mission
+        click.echo(
+            f"{loaded.name}: {len(loaded.robots)} robots, {len(loaded.tasks)} tasks, "
+            f"{len(faults)} errors, {len(warnings)} warnings"
+        )
+    if faults:
+        raise click.exceptions.Exit(1)
+
+
+@main.command(
+    name="map",
+    epilog=_examples("oath map missions/maze-25.yaml --points 2000 --png roadmap.png"),
+)
+@_mission_argument
+@_seed_option
+@_points_option(1000)
+@click.option("--png", type=click.Path(dir_okay=False, path_type=Path), help="Draw it to a file.")
+@_json_option
+def map_(mission: Path, seed: int, points: int, png: Path | None, as_json: bool) -> None:
+    """Build the roadmap; print counts, connectivity and build time."""
+    import oath
+    from oath import runtime
+    from oath.world.roadmap import Params
+
+    scene = runtime.prepare(oath.load(mission), Params(points=points), seed)
+    roadmap = scene.world.roadmap
+    out_of_reach = runtime.unreachable(scene)
+    report = {
+        "points": roadmap.sampled,
+        "nodes": roadmap.graph.size,
+        "edges": len(roadmap.edges()),
+        "components": max(
+            len(set(roadmap.components(mode).tolist())) for mode in range(len(roadmap.modes))
+        ),
+        "seconds": {
+            "sampling": roadmap.seconds.sampling,
+            "triangulation": roadmap.seconds.triangulation,
+            "collision": roadmap.seconds.collision,
+            "total": roadmap.seconds.total,
+        },
+        "unreachable": sorted(out_of_reach),
+    }
+    if png is not None:
+        from oath.picture import draw_map
+
+        draw_map(scene.mission, roadmap.nodes(), roadmap.edges(), png)
+    if as_json:
+        _print_json(report)
+    else:
+        click.echo(
+            f"{scene.mission.name}: {report['points']} points, {report['nodes']} nodes, "
+            f"{report['edges']} edges, {report['components']} components, "
+            f"built in {roadmap.seconds.total * 1e3:.1f} ms"
+        )
+        for task, why in out_of_reach.items():
+            click.echo(f"  out of reach: task '{task}': {why}")
+    if out_of_reach:
+        raise click.exceptions.Exit(1)
+
+
+@main.command(epilog=_examples("oath verify missions/maze-25-gates.yaml out/events.jsonl"))
+@_mission_argument
+@click.argument("events", metavar="EVENTS", type=click.Path(path_type=Path))
+@_json_option
+def verify(mission: Path, events: Path, as_json: bool) -> None:
+    """Judge an event log independently of what made it; list every violation."""
+    import oath
+    from oath.formats.event_log import read
+    from oath.verify import verify as judge
+
+    loaded = oath.load(mission)
+    log = [event for _, event in read(events, places=loaded.places)]
+    verdict = judge(loaded, log)
+    if as_json:
+        _print_json(
+            {
+                "ok": verdict.ok,
+                "checked": dict(verdict.checked),
+                "least_separation": verdict.least_separation,
+                "violations": [
+                    {
+                        "rule": violation.rule,
+                        "seq": violation.seq,
+                        "robot": violation.robot,
+                        "message": violation.message,
+                    }
+                    for violation in verdict.violations
+                ],
+            }
+        )
+    else:
+        for violation in verdict.violations:
+            click.echo(f"violation: {violation}")
+        counts = ", ".join(f"{count} {what}" for what, count in verdict.checked.items())
+        click.echo(f"{'ok' if verdict.ok else 'NOT ok'}: judged {counts}")
+        if verdict.least_separation is not None:
+            click.echo(f"least distance between two robots: {verdict.least_separation:.2f} m")
+    if not verdict.ok:
+        raise click.exceptions.Exit(1)
+
+
+if __name__ == "__main__":
+    main()
