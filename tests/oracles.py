@@ -7,11 +7,19 @@ its value types, and is what the tests of a room compare against.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from collections.abc import Set as AbstractSet
 from itertools import combinations, permutations
 
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+from shapely.geometry import LineString, Polygon, box
+from shapely.geometry import Point as Spot
+
 from oath.allocate.problem import Problem
+from oath.model import Map, Obstacle
+from oath.motion.buchi import Automaton
 from oath.motion.ltl import Formula
 
 # --- Selection --------------------------------------------------------------------------------
@@ -120,3 +128,135 @@ def holds(
         raise AssertionError(part.op)
 
     return values(formula)[0]
+
+
+# --- Workspace ------------------------------------------------------------------------------
+
+
+def gap(map: Map, obstacles: Iterable[Obstacle], *way: tuple[float, float]) -> float:
+    """Return how far a point, or the straight line between two, is from walls and obstacles."""
+    shape = Spot(way[0]) if len(way) == 1 or way[0] == way[1] else LineString(way)
+    distances = [math.inf]
+    for wall in map.walls:
+        line = LineString(wall) if len(set(wall)) > 1 else Spot(wall[0])
+        distances.append(shape.distance(line) - map.wall_thickness / 2)
+    distances += [shape.distance(Polygon(obstacle.polygon)) for obstacle in obstacles]
+    if map.grid is not None:
+        size, (x, y) = map.grid.resolution, map.grid.origin
+        for row, column in np.argwhere(map.grid.occupied).tolist():
+            left, low = x + column * size, y + row * size
+            distances.append(shape.distance(box(left, low, left + size, low + size)))
+    return max(min(distances), 0.0)
+
+
+# --- Product search -------------------------------------------------------------------------
+
+
+def stays_accepted(automaton: Automaton, letter: AbstractSet[str]) -> list[bool]:
+    """Return for every state whether it accepts the letter repeated for ever."""
+    n = automaton.states
+    reach = np.zeros((n, n), dtype=bool)
+    for source, label, target in automaton.edges:
+        if label.positive <= letter and not label.negative & letter:
+            reach[source, target] = True
+    for via in range(n):  # Warshall's closure
+        reach |= reach[:, via : via + 1] & reach[via : via + 1]
+    again = [f for f in automaton.accepting if reach[f, f]]
+    return [q in again or any(reach[q, f] for f in again) for q in range(n)]
+
+
+class Product:
+    """The explicit product of a graph, the rules' automaton and a chain of stops.
+
+    Its nodes are (stops served, rule state, graph node). `ends` (m, 2), `costs` (m,) [um] and
+    `letters` (m) describe the open edges; `stops` are pairs of a node and the letter that serving
+    it reads; `last` is the letter for ever after.
+    """
+
+    def __init__(
+        self,
+        size: int,
+        ends: np.ndarray,
+        costs: np.ndarray,
+        letters: Sequence[AbstractSet[str]],
+        automaton: Automaton,
+        avoid: AbstractSet[str],
+        stops: Sequence[tuple[int, AbstractSet[str]]],
+        last: AbstractSet[str],
+    ) -> None:
+        self.size, self.automaton, self.avoid, self.stops = size, automaton, avoid, stops
+        source, target, weight = [], [], []
+        kinds = sorted({tuple(sorted(letter)) for letter in letters})
+        for kind in kinds:
+            mine = np.array([tuple(sorted(letter)) == kind for letter in letters])
+            (a, b), c = ends[mine].T, costs[mine]
+            for q, p in self.steps(set(kind)):
+                for served in range(len(stops)):
+                    source += [self.number(served, q, a), self.number(served, q, b)]
+                    target += [self.number(served, p, b), self.number(served, p, a)]
+                    weight += [c, c]
+        for served, (node, letter) in enumerate(stops):
+            for q, p in self.steps(letter):
+                source.append([self.number(served, q, node)])
+                target.append([self.number(served + 1, p, node)])
+                weight.append([self.SERVICE])
+        self.arcs = [np.concatenate(part) if part else [] for part in (source, target, weight)]
+        ends_well = stays_accepted(automaton, last)
+        self.goals = [
+            self.number(len(stops), q, stops[-1][0])
+            for q in range(automaton.states)
+            if ends_well[q] and not last & avoid
+        ]
+
+    # A sparse matrix cannot tell an arc that costs nothing from none; this is taken off again.
+    SERVICE = 1
+
+    def number(self, served: int, q: int, node: np.ndarray | int) -> np.ndarray | int:
+        return (served * self.automaton.states + q) * self.size + node
+
+    def steps(self, letter: AbstractSet[str]) -> list[tuple[int, int]]:
+        """Return how reading a letter may change the rule state."""
+        if letter & self.avoid:
+            return []
+        pairs = {
+            (source, target)
+            for source, label, target in self.automaton.edges
+            if label.positive <= letter and not label.negative & letter
+        }
+        return sorted(pairs)
+
+    def distances(
+        self, links: Sequence[tuple[int, int, AbstractSet[str]]], states: AbstractSet[int]
+    ) -> np.ndarray:
+        """Return the costs from the robot, who may drive the links (node, cost, letter)."""
+        total = (len(self.stops) + 1) * self.automaton.states * self.size
+        source, target, weight = (list(part) for part in self.arcs)
+        for node, cost, letter in links:
+            for q, p in self.steps(letter):
+                if q in states:
+                    source.append(total)
+                    target.append(self.number(0, p, node))
+                    weight.append(cost + self.SERVICE)
+        least: dict[tuple[int, int], float] = {}
+        for a, b, c in zip(source, target, weight, strict=True):
+            least[a, b] = min(least.get((a, b), math.inf), c)
+        pairs = np.array(list(least), dtype=np.int64).reshape(-1, 2).T
+        matrix = csr_array((list(least.values()), tuple(pairs)), shape=(total + 1, total + 1))
+        return dijkstra(matrix, indices=total)
+
+    def cost(
+        self, links: Sequence[tuple[int, int, AbstractSet[str]]], states: AbstractSet[int]
+    ) -> tuple[int | None, int | None]:
+        """Return the least cost [um] of serving every stop, and if there is none which blocks.
+
+        The blocked stop is the first that no way serves; the last if only the end is not allowed.
+        """
+        found = self.distances(links, states)
+        least = min((found[goal] for goal in self.goals), default=math.inf)
+        if least < math.inf:
+            return round(least) - self.SERVICE * (1 + len(self.stops)), None
+        for served, (node, _) in enumerate(self.stops):
+            served_here = [self.number(served + 1, q, node) for q in range(self.automaton.states)]
+            if not np.isfinite(found[served_here]).any():
+                return None, served
+        return None, len(self.stops) - 1

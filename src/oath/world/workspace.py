@@ -266,13 +266,18 @@ def _grid_corners(grid: OccupancyGrid, offset: float, spacing: float) -> Array:
 
 
 def _boundary(grid: OccupancyGrid) -> Array:
-    """Ends (2 n, 2) of the maximal segments between free and occupied cells."""
+    """Ends (2 n, 2) of the maximal segments between free and occupied cells.
+
+    What lies outside the raster counts as free: else an occupied cell would have no surface there,
+    and a robot could drive along the edge of the map through it.
+    """
     x, y, size = *grid.origin, grid.resolution
-    across = _runs(grid.occupied[1:] != grid.occupied[:-1])
-    along = _runs((grid.occupied[:, 1:] != grid.occupied[:, :-1]).T)
+    occupied = np.pad(grid.occupied, 1)
+    across = _runs(occupied[1:, 1:-1] != occupied[:-1, 1:-1])
+    along = _runs((occupied[1:-1, 1:] != occupied[1:-1, :-1]).T)
     parts = []
     for line, first, last, turned in ((*across, False), (*along, True)):
-        ends = np.stack([first, line + 1, last, line + 1], axis=1).reshape(-1, 2)
+        ends = np.stack([first, line, last, line], axis=1).reshape(-1, 2)
         parts.append(ends[:, ::-1] if turned else ends)
     ends = np.concatenate(parts) * size
     return np.ascontiguousarray(ends + np.array([x, y]))
