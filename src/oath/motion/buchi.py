@@ -237,7 +237,11 @@ class _Alternating:
     def _obliged(self, part: Formula) -> list[int]:
         """Return the options of a part; one that puts an eventual part off has it pending."""
         again = 1 << self._target + self._number[part]
-        pending = (1 << self._pending + self._number[part]) * (part.op in ("F", "U", "M"))
+        pending = 1 << self._pending + self._number[part]
+        if _recurrent(part):
+            return [again | pending, *self._both(self._delta(part.args[0].args[0]), [again])]
+        if part.op not in ("F", "U", "M"):
+            return self._delta(part)
         return [word | pending if word & again else word for word in self._delta(part)]
 
     def _successors(self, state: int) -> list[int]:
@@ -297,6 +301,8 @@ class _Alternating:
         if op == "X":
             return self._later(args[0])
         again = [1 << self._target + self._number[part]]
+        if _recurrent(part):
+            return again
         last = self._delta(args[-1])
         if op == "F":
             return minimal(last + again)
@@ -306,6 +312,15 @@ class _Alternating:
         if op in "UW":
             return minimal(last + self._both(first, again))
         return self._both(last, minimal(first + again))
+
+
+def _recurrent(part: Formula) -> bool:
+    """Whether the part is of the form G F a.
+
+    As a state that loops, in an acceptance set whenever it sees a, it is never joined by F a: n
+    such parts take one state instead of one for each set of them.
+    """
+    return part.op == "G" and part.args[0].op == "F"
 
 
 def _spell(graph: Graph, never: frozenset[str]) -> Automaton:

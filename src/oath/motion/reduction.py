@@ -148,7 +148,10 @@ def _prune(graph: Graph) -> Graph:
     This is what keeps a sequence such as ``F (a & F b)`` small: once a has been seen, waiting for
     b beats waiting for another a.
     """
-    better = _simulation(graph)
+    words = {word for edges in graph.edges for word, _ in edges}
+    if (len(graph.edges) + len(words)) * sum(map(len, graph.edges)) > _MAX_COMPARISONS:
+        return graph
+    better = _simulation(graph, sorted(words))
     twin = [next(t for t in bits(better[s]) if better[t] >> s & 1) for s in range(len(better))]
 
     def best(own: list[tuple[int, int]]) -> list[tuple[int, int]]:
@@ -170,17 +173,13 @@ def _prune(graph: Graph) -> Graph:
     return Graph(graph.names, initial, edges, graph.accepting)
 
 
-def _simulation(graph: Graph) -> list[int]:
+def _simulation(graph: Graph, words: list[int]) -> list[int]:
     """Return, for each state, those that simulate it directly, as bits.
 
     State t simulates s if t accepts where s does, and to each edge of s there is one of t that
     asks for less, is in as many acceptance sets, and leads to a state that simulates its target.
-    Beyond a size each state is said to simulate only itself, which is always safe.
     """
     n = len(graph.edges)
-    words = sorted({word for edges in graph.edges for word, _ in edges})
-    if (n + len(words)) * sum(map(len, graph.edges)) > _MAX_COMPARISONS:
-        return [1 << state for state in range(n)]
     place = {word: i for i, word in enumerate(words)}
     edges = [[(place[word], target) for word, target in own] for own in graph.edges]
     lesser = [[_targets(own, word) for word in words] for own in graph.edges]
