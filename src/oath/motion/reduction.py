@@ -49,27 +49,22 @@ def bits(word: int) -> list[int]:
 
 
 def trim(graph: Graph) -> Graph:
-    """Remove states without an accepting run, and make look alike what cannot matter.
+    """Remove states without an accepting run, and acceptance where it cannot matter.
 
-    Acceptance matters only on cycles: an edge that leaves its component gets no pending set, and
-    in a component without an accepting cycle every edge gets all of them.
+    It matters only on cycles: an edge that leaves its component is put in every set, so that more
+    states look alike.
     """
     out = [[target for _, target in edges] for edges in graph.edges]
     component = components(out)
     sets = _acceptance(graph, component)
     live = reaching(out, component, {c for c, (always, _) in sets.items() if not always})
     shift = graph.shift
-    everything = 0
-    for _, ever in sets.values():
-        everything |= ever
     number = {state: i for i, state in enumerate(s for s in range(len(out)) if live[s])}
     edges: list[list[tuple[int, int]]] = []
     for state in number:
         edges.append([])
         for word, target in graph.edges[state]:
             pending = word >> shift if component[state] == component[target] else 0
-            if pending and sets[component[state]][0]:
-                pending = everything
             if target in number:
                 label = word & ~(-1 << shift)
                 edges[-1].append((label | pending << shift, number[target]))
