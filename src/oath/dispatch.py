@@ -20,7 +20,7 @@ from oath.events import (
     PlanReason,
     StopServed,
 )
-from oath.model import Mission, Point, Route, Task
+from oath.model import Mission, Point, Route, RouteStop, Task
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -169,9 +169,10 @@ def _allocate(state: State) -> tuple[State, tuple[Action, ...]]:
 
 
 def _allocated(state: State, event: Allocated) -> tuple[State, tuple[Action, ...]]:
-    changed = [robot for robot, route in event.routes.items() if route != state.robots[robot].route]
+    routes = _still_good(state, event.routes)
+    changed = [robot for robot, route in routes.items() if route != state.robots[robot].route]
     for robot in changed:
-        state = _with(state, robot, route=event.routes[robot])
+        state = _with(state, robot, route=routes[robot])
     state = replace(state, allocating=False, rounds=event.round, unassigned=dict(event.unassigned))
     actions: tuple[Action, ...] = tuple(
         Plan(robot, "allocated") for robot in changed if state.robots[robot].route
@@ -180,6 +181,48 @@ def _allocated(state: State, event: Allocated) -> tuple[State, tuple[Action, ...
         state, more = _allocate(state)
         return state, actions + more
     return state, actions + _finish_if_still(state)
+
+
+def _still_good(state: State, routes: Mapping[str, Route]) -> dict[str, Route]:
+    """The routes of an answer less what happened while it was made.
+
+    Stops served meanwhile are left out. A route that no longer fits its robot is passed over, and
+    with it every route that takes a task which such a robot keeps; another round is due then.
+    """
+    good = {}
+    for id, route in routes.items():
+        left = tuple(stop for stop in route if not _is_served(state, id, stop))
+        if _fits(state, id, left):
+            good[id] = left
+    while True:
+        kept = {
+            stop.task
+            for id, robot in state.robots.items()
+            if id not in good
+            for stop in robot.route
+        }
+        clash = [id for id, route in good.items() if any(stop.task in kept for stop in route)]
+        if not clash:
+            return good
+        for id in clash:
+            del good[id]
+
+
+def _is_served(state: State, robot: str, stop: RouteStop) -> bool:
+    is_first = stop.stop == state.tasks[stop.task].stops[0].name
+    carried = stop.task in state.robots[robot].carrying
+    return stop.task in state.completed or (carried and is_first)
+
+
+def _fits(state: State, robot: str, route: Route) -> bool:
+    """Whether a route delivers all that its robot carries, and takes up only what it may."""
+    carrying = state.robots[robot].carrying
+    tasks = {stop.task for stop in route}
+    may_begin = set(state.open_tasks())
+    return all(task in tasks or task in state.stranded for task in carrying) and all(
+        task in carrying or (task in may_begin and (robot, task) not in state.refused)
+        for task in tasks
+    )
 
 
 def _planned(state: State, event: Planned) -> tuple[State, tuple[Action, ...]]:
@@ -207,6 +250,9 @@ def _stop_served(state: State, event: StopServed) -> tuple[State, tuple[Action, 
         carrying = (*carrying, event.task)
     else:
         state = replace(state, completed=state.completed | {event.task})
+    # What a rule forbade before may be allowed now.
+    refused = frozenset(pair for pair in state.refused if pair[0] != event.robot)
+    state = replace(state, refused=refused)
     route = robot.route[1:]
     state = _with(state, event.robot, position=event.at, route=route, carrying=carrying)
     if route:
