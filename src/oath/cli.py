@@ -369,9 +369,7 @@ def map_(mission: Path, seed: int, points: int, png: Path | None, as_json: bool)
         "points": roadmap.sampled,
         "nodes": roadmap.graph.size,
         "edges": len(roadmap.edges()),
-        "components": max(
-            len(set(roadmap.components(mode).tolist())) for mode in range(len(roadmap.modes))
-        ),
+        "components": max(roadmap.parts(mode) for mode in range(len(roadmap.modes))),
         "seconds": {
             "sampling": roadmap.seconds.sampling,
             "triangulation": roadmap.seconds.triangulation,

@@ -126,6 +126,13 @@ class Roadmap:
         labels: NDArray[np.int32] = connected_components(matrix, directed=False)[1]
         return labels
 
+    def parts(self, mode: int) -> int:
+        """How many parts the edges open in a mode fall into; nodes without such an edge are none.
+
+        In the mode of a ground robot, the nodes that a drone has above a bush are of that kind.
+        """
+        return len(np.unique(self.components(mode)[self.edges(mode)[:, 0]]))
+
     def travel(
         self,
         mode: int,
@@ -288,7 +295,8 @@ class Roadmap:
         for m, mode in enumerate(self.modes):
             costs = np.full(len(edges), _core.UNREACHABLE, dtype=np.int64)
             free = self.workspace.free(a, b, mode)
-            costs[free] = self._micro(a[free], b[free], mode)
+            # Nodes may coincide, but an edge always costs something: the search relies on it.
+            costs[free] = np.maximum(self._micro(a[free], b[free], mode), 1)
             changed |= costs != self.graph.costs(m)[edges]
             self.graph.set_costs(m, edges, costs)
         return changed
