@@ -185,22 +185,21 @@ class Product:
         last: AbstractSet[str],
     ) -> None:
         self.size, self.automaton, self.avoid, self.stops = size, automaton, avoid, stops
-        source, target, weight = [], [], []
-        kinds = sorted({tuple(sorted(letter)) for letter in letters})
-        for kind in kinds:
-            mine = np.array([tuple(sorted(letter)) == kind for letter in letters])
-            (a, b), c = ends[mine].T, costs[mine]
-            for q, p in self.steps(set(kind)):
+        arcs = [np.empty((0, 3), dtype=np.int64)]
+        words = [" ".join(sorted(letter)) for letter in letters]
+        for word in sorted(set(words)):
+            mine = np.array([other == word for other in words])
+            (a, b), c = ends[mine].T.astype(np.int64), costs[mine]
+            for q, p in self.steps(set(word.split())):
                 for served in range(len(stops)):
-                    source += [self.number(served, q, a), self.number(served, q, b)]
-                    target += [self.number(served, p, b), self.number(served, p, a)]
-                    weight += [c, c]
+                    for one, other in ((a, b), (b, a)):
+                        here, there = self.number(served, q, one), self.number(served, p, other)
+                        arcs.append(np.stack([here, there, c], axis=1))
         for served, (node, letter) in enumerate(stops):
             for q, p in self.steps(letter):
-                source.append([self.number(served, q, node)])
-                target.append([self.number(served + 1, p, node)])
-                weight.append([self.SERVICE])
-        self.arcs = [np.concatenate(part) if part else [] for part in (source, target, weight)]
+                here, there = self.number(served, q, node), self.number(served + 1, p, node)
+                arcs.append(np.array([[here, there, self.SERVICE]]))
+        self.arcs = np.concatenate(arcs)
         ends_well = stays_accepted(automaton, last)
         self.goals = [
             self.number(len(stops), q, stops[-1][0])
@@ -230,18 +229,23 @@ class Product:
     ) -> np.ndarray:
         """Return the costs from the robot, who may drive the links (node, cost, letter)."""
         total = (len(self.stops) + 1) * self.automaton.states * self.size
-        source, target, weight = (list(part) for part in self.arcs)
-        for node, cost, letter in links:
-            for q, p in self.steps(letter):
-                if q in states:
-                    source.append(total)
-                    target.append(self.number(0, p, node))
-                    weight.append(cost + self.SERVICE)
-        least: dict[tuple[int, int], float] = {}
-        for a, b, c in zip(source, target, weight, strict=True):
-            least[a, b] = min(least.get((a, b), math.inf), c)
-        pairs = np.array(list(least), dtype=np.int64).reshape(-1, 2).T
-        matrix = csr_array((list(least.values()), tuple(pairs)), shape=(total + 1, total + 1))
+        entries = [
+            (total, self.number(0, p, node), cost + self.SERVICE)
+            for node, cost, letter in links
+            for q, p in self.steps(letter)
+            if q in states
+        ]
+        first = np.array(entries, dtype=np.int64).reshape(-1, 3)
+        source, target, weight = np.concatenate([self.arcs, first]).T
+        # A sparse matrix adds up arcs that run side by side; only the cheapest of them counts.
+        order = np.lexsort((weight, target, source))
+        source, target, weight = source[order], target[order], weight[order]
+        least = np.ones(len(order), dtype=bool)
+        least[1:] = (np.diff(source) != 0) | (np.diff(target) != 0)
+        matrix = csr_array(
+            (weight[least].astype(float), (source[least], target[least])),
+            shape=(total + 1, total + 1),
+        )
         return dijkstra(matrix, indices=total)
 
     def cost(

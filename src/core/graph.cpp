@@ -146,10 +146,13 @@ void bind_graph(nb::module_& m) {
             [](Graph& self, int mode, Array<int> edges, Array<Cost> costs) {
                 same_length(edges, costs);
                 auto& row = self.costs.at(mode);
+                // Edges that cost nothing could support each other's values in a ring.
+                for (std::size_t i = 0; i < costs.shape(0); ++i)
+                    if (costs.data()[i] <= 0) throw std::invalid_argument("costs must be positive");
                 for (std::size_t i = 0; i < edges.shape(0); ++i)
                     row.at(edges.data()[i]) = costs.data()[i];
             },
-            "mode"_a, "edges"_a, "costs"_a, "Set the costs [um] of edges in a mode.")
+            "mode"_a, "edges"_a, "costs"_a, "Set the costs [um] of edges in a mode; at least 1, and no less than the straight line.")
         .def(
             "costs",
             [](const Graph& self, int mode) { return array(std::vector<Cost>(self.costs.at(mode))); },

@@ -73,6 +73,7 @@ void Leg::set_ends(const std::vector<Cost>& ends) {
     if (ends == ends_ && !fresh_) return;
     ends_ = ends;
     if (fresh_) return;
+    grow();
     for (int q = 0; q < drive_->states; ++q) {
         const int s = target_ * drive_->states + q;
         const Cost least = best(s);
@@ -84,7 +85,8 @@ void Leg::set_ends(const std::vector<Cost>& ends) {
 }
 
 void Leg::set_start(Vec at, std::vector<Link> links, std::vector<int> states, bool each) {
-    if (!fresh_) offset_ += line_cost(at_, at) + 1;  // rounded up: keys stay lower bounds
+    // Old keys must stay lower bounds, though a line's cost may be one too low, and by rounding two.
+    if (!fresh_) offset_ += line_cost(at_, at) + 2;
     at_ = at, links_ = std::move(links), starts_ = std::move(states), each_ = each;
 }
 
@@ -137,6 +139,22 @@ Cost Leg::enter(int q, const Link& link) const {
             least = std::min(least, g(link.node * drive_->states + p));
     }
     return add(least, link.cost);
+}
+
+std::vector<int> Leg::entries() const {
+    std::vector<int> out;
+    for (const Link& link : links_) {
+        if (link.cost >= kUnreachable) continue;
+        for (int q : starts_) {
+            if (link.label < 0) {
+                out.push_back(link.node * drive_->states + q);
+            } else {
+                for (int p : drive_->next[link.label * drive_->states + q])
+                    out.push_back(link.node * drive_->states + p);
+            }
+        }
+    }
+    return out;
 }
 
 Cost Leg::value(int q) const {
@@ -313,6 +331,7 @@ std::vector<std::pair<int, int>> Leg::path(int q) const {
 Planner::Planner(const Graph& graph, int mode, Drive drive, std::vector<int> targets,
                  std::vector<std::vector<std::uint8_t>> serve, std::vector<std::uint8_t> settled)
     : graph_(&graph),
+      mode_(mode),
       drive_(std::move(drive)),
       targets_(std::move(targets)),
       serve_(std::move(serve)),
@@ -363,7 +382,7 @@ Cost Planner::plan() {
         for (int q = 0; q < drive_.states; ++q) ends[q] = rest(leg, q).first;
         const Cost least = *std::min_element(ends.begin(), ends.end());
         if (least >= kUnreachable) {
-            blocked_ = std::min(leg + 1, n - 1);
+            blocked_ = first_blocked();
             return kUnreachable;
         }
         // Only the differences steer a leg; a common offset would shift all of its keys.
@@ -385,7 +404,7 @@ Cost Planner::walk() {
     Cost total = 0;
     for (int leg = current_; leg < n; ++leg) {
         if (q < 0 || legs_[leg]->value(q) >= kUnreachable) {
-            blocked_ = leg;
+            blocked_ = first_blocked();
             path_.clear();
             return kUnreachable;
         }
@@ -396,6 +415,34 @@ Cost Planner::walk() {
         path_.push_back({leg, -1, q});
     }
     return total;
+}
+
+int Planner::first_blocked() const {
+    const int n = drive_.states, legs = static_cast<int>(legs_.size());
+    const auto& costs = graph_->costs[mode_];
+    std::vector<int> open = legs_[current_]->entries();
+    for (int leg = current_; leg < legs; ++leg) {
+        std::vector<std::uint8_t> seen(static_cast<std::size_t>(graph_->size()) * n, 0);
+        for (int s : open) seen[s] = 1;
+        while (!open.empty()) {
+            const int s = open.back(), v = s / n, q = s % n;
+            open.pop_back();
+            for (const Arc& arc : graph_->arcs[v]) {
+                if (costs[arc.edge] >= kUnreachable) continue;
+                for (int p : drive_.next[graph_->label[arc.edge] * n + q]) {
+                    const int t = arc.to * n + p;
+                    if (!seen[t]) seen[t] = 1, open.push_back(t);
+                }
+            }
+        }
+        std::vector<std::uint8_t> served(n, 0);
+        for (int q = 0; q < n; ++q)
+            for (int p = 0; p < n; ++p)
+                if (seen[targets_[leg] * n + q] && serve_[leg][q * n + p] && !served[p])
+                    served[p] = 1, open.push_back(targets_[leg] * n + p);
+        if (open.empty()) return leg;
+    }
+    return legs - 1;
 }
 
 long Planner::expanded() const {
@@ -448,16 +495,31 @@ void bind_planner(nb::module_& m) {
                std::vector<std::uint8_t> states) {
                 if (nodes.size() != costs.size() || nodes.size() != labels.size())
                     throw std::invalid_argument("arrays differ in length");
+                if (leg < 0 || leg > self.legs()) throw std::out_of_range("no such leg");
+                if (static_cast<int>(states.size()) != self.drive().states)
+                    throw std::invalid_argument("states needs a flag for every rule state");
                 std::vector<oath::Link> links;
-                for (std::size_t i = 0; i < nodes.size(); ++i)
+                for (std::size_t i = 0; i < nodes.size(); ++i) {
+                    if (nodes[i] < 0 || nodes[i] >= self.graph().size())
+                        throw std::out_of_range("no such node");
+                    if (labels[i] < -1 || labels[i] >= self.drive().labels)
+                        throw std::out_of_range("no such label");
                     links.push_back({nodes[i], costs[i], labels[i]});
+                }
                 self.start(leg, {x, y}, std::move(links), std::move(states));
             },
             "leg"_a, "x"_a, "y"_a, "nodes"_a, "costs"_a, "labels"_a, "states"_a,
             "The robot is at (x, y) on its way to stop `leg`; it may enter the graph at the nodes "
             "at these costs [um], driving edges of these labels.")
-        .def("changed", &Planner::changed, "edges"_a, nb::call_guard<nb::gil_scoped_release>(),
-             "The costs of these edges changed.")
+        .def(
+            "changed",
+            [](Planner& self, std::vector<int> edges) {
+                for (int e : edges)
+                    if (e < 0 || e >= self.graph().edges()) throw std::out_of_range("no such edge");
+                nb::gil_scoped_release release;
+                self.changed(edges);
+            },
+            "edges"_a, "The costs of these edges changed.")
         .def("plan", &Planner::plan, nb::call_guard<nb::gil_scoped_release>(),
              "Repair the plan; return its cost [um], UNREACHABLE if there is none.")
         .def(

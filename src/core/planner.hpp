@@ -48,7 +48,8 @@ public:
     // Repair, or begin again when repairing has cost more than a search from scratch.
     void search();
 
-    Cost value(int q) const;  // from the start in rule state q, kUnreachable if there is no way
+    std::vector<int> entries() const;  // where the links lead from the start's rule states
+    Cost value(int q) const;           // from the start in rule state q, kUnreachable if there is no way
     // Nodes and rule states from the start in q to the target; empty if there is none.
     std::vector<std::pair<int, int>> path(int q) const;
     int target() const { return target_; }
@@ -112,6 +113,8 @@ public:
     void start(int leg, Vec at, std::vector<Link> links, std::vector<std::uint8_t> states);
     void changed(const std::vector<int>& edges);
     Cost plan();  // cost of the whole route, kUnreachable if there is none
+    // After a plan() without a way: the first stop that no way serves, or the last if all can be
+    // served, but only so that a rule is broken.
     int blocked() const { return blocked_; }
 
     struct Step {
@@ -119,13 +122,18 @@ public:
     };
     const std::vector<Step>& path() const { return path_; }  // of the last plan()
     long expanded() const;
+    const Graph& graph() const { return *graph_; }
+    const Drive& drive() const { return drive_; }
+    int legs() const { return static_cast<int>(legs_.size()); }
 
 private:
     // What remains once stop `leg` is served in rule state q, and the rule state that leads there.
     std::pair<Cost, int> rest(int leg, int q) const;
     Cost walk();
+    int first_blocked() const;  // floods the product forwards
 
     const Graph* graph_;
+    int mode_;
     Drive drive_;
     std::vector<int> targets_;
     std::vector<std::vector<std::uint8_t>> serve_;  // by leg: (states, states)

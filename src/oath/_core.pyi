@@ -72,7 +72,9 @@ class Graph:
         """Append edges, unreachable in every mode."""
 
     def set_costs(self, mode: int, edges: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], costs: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None:
-        """Set the costs [um] of edges in a mode."""
+        """
+        Set the costs [um] of edges in a mode; at least 1, and no less than the straight line.
+        """
 
     def costs(self, mode: int) -> NDArray[numpy.int64]:
         """Costs [um] of all edges in a mode."""

@@ -61,7 +61,7 @@ class Planner:
         self._states = frozenset(rules.automaton.initial)
         self._services: tuple[Service, ...] = ()
         self._core: _core.Planner | None = None
-        self._labels_known = 0
+        self._labels_known = self._edges_known = 0
         self._leg = 0
         self._pending: list[NDArray[np.int32]] = []
         self._plan = Plan(length=0.0, legs=())
@@ -79,6 +79,9 @@ class Planner:
         nodes, costs, labels = self.roadmap.links(at, self.mode)
         if len(self.roadmap.zones.classes) > self._labels_known:
             core = self._searcher()
+        if (edges := self.roadmap.graph.edges) > self._edges_known:  # others inserted their stops
+            self._pending.append(np.arange(self._edges_known, edges, dtype=np.int32))
+            self._edges_known = edges
         core.start(self._leg, at[0], at[1], nodes, costs, labels, flags)
         if self._pending:
             core.changed(np.concatenate(self._pending).tolist())
@@ -87,7 +90,7 @@ class Planner:
         if reached:
             self._plan = self._waypoints(core.path(), at)
         else:
-            blocked = max(core.blocked - self._leg, 0)
+            blocked = core.blocked - self._leg if states else 0
             self._plan = Plan(length=0.0, legs=(), blocked=blocked)
         return self._plan
 
@@ -115,9 +118,7 @@ class Planner:
         """
         way = _distinct(self._plan.legs[0])
         pulled = self._pull(way)
-        self._plan = Plan(
-            length=self._plan.length, legs=(pulled, *self._plan.legs[1:]), blocked=None
-        )
+        self._plan = _plan((pulled, *self._plan.legs[1:]))
         points = [(float(x), float(y)) for x, y in pulled[1:]]
         if points:
             points[-1] = self._services[self._leg].at
@@ -133,7 +134,7 @@ class Planner:
         service = self._services[self._leg]
         self._states = self.rules.step(self._states, service.letter)
         self._leg += 1
-        self._plan = Plan(length=self._plan.length, legs=self._plan.legs[1:])
+        self._plan = _plan(self._plan.legs[1:])
 
     # -- inside
 
@@ -160,6 +161,7 @@ class Planner:
                 automaton.settled(self.roadmap.zones.at(last)),
             )
             self._labels_known = len(classes)
+            self._edges_known = self.roadmap.graph.edges
             self._pending.clear()
         return self._core
 
@@ -172,8 +174,7 @@ class Planner:
             else:
                 legs.append(np.array(way))
                 way = way[-1:]
-        length = sum(float(np.hypot(*np.diff(leg, axis=0).T).sum()) for leg in legs)
-        return Plan(length=length, legs=tuple(legs))
+        return _plan(tuple(legs))
 
     def _pull(self, way: Array) -> Array:
         labels = self.roadmap.zones.labels(way[:-1], way[1:])
@@ -206,6 +207,12 @@ class Planner:
             share = (along[first + 1 : last] - along[first]) / span
             out[first + 1 : last] = way[first] + share[:, None] * (way[last] - way[first])
         return out
+
+
+def _plan(legs: tuple[Array, ...]) -> Plan:
+    """The plan along these legs."""
+    length = sum(float(np.hypot(*np.diff(leg, axis=0).T).sum()) for leg in legs)
+    return Plan(length=length, legs=legs)
 
 
 def _distinct(way: Array) -> Array:

@@ -81,6 +81,7 @@ class Roadmap:
         self.graph = _core.Graph(len(modes))
         self._sequence = Halton(workspace.bounds, rng)
         self._node_at: dict[Point, int] = {}
+        self._around: set[Point] = set()  # corner nodes of obstacles that were added
         begin = time.perf_counter()
         motions = [mode.motion for mode in modes]
         nodes = sample(workspace, motions, params.points, params.density, rng)
@@ -169,7 +170,11 @@ class Roadmap:
         changed = self._refresh(obstacle)
         if self.params.corners:
             before = self.graph.edges
-            self._append(self._useful(self._corners_of(obstacle)))
+            around = self._useful(self._corners_of(obstacle))
+            # An obstacle that comes back finds its corner nodes where it left them.
+            new = [tuple(at) not in self._around for at in around.tolist()]
+            self._around.update(map(tuple, around.tolist()))
+            self._append(around[new])
             changed = np.concatenate([changed, np.arange(before, self.graph.edges, dtype=np.int32)])
         return changed
 
