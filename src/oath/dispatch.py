@@ -25,7 +25,10 @@ from oath.model import Mission, Point, Route, RouteStop, Task
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotState:
-    """Where a robot was last seen [m], what remains of its route, and the tasks it carries."""
+    """Where a robot was last seen [m], what remains of its route, and the tasks it carries.
+
+    What it cannot deliver stays in its hands.
+    """
 
     position: Point
     route: Route = ()
@@ -60,8 +63,9 @@ class State:
         return cls(t=0.0, tasks={task.id: task for task in mission.tasks}, robots=robots)
 
     def carried(self) -> frozenset[str]:
-        """Tasks that some robot has picked up and not delivered."""
-        return frozenset(task for robot in self.robots.values() for task in robot.carrying)
+        """Tasks that some robot has picked up and will deliver."""
+        loads = frozenset(task for robot in self.robots.values() for task in robot.carrying)
+        return loads - self.stranded.keys()
 
     def open_tasks(self) -> tuple[str, ...]:
         """Tasks that nobody has picked up, in their given order."""
@@ -120,7 +124,7 @@ class UpdateMap:
 
 @dataclass(frozen=True, slots=True)
 class Finish:
-    """Nothing is left to do; answer with `MissionFinished`."""
+    """Nothing is left to do; answer with `MissionFinished` once all robots stand."""
 
 
 Action = Allocate | Plan | Repair | Drive | UpdateMap | Finish
@@ -174,9 +178,8 @@ def _allocated(state: State, event: Allocated) -> tuple[State, tuple[Action, ...
     for robot in changed:
         state = _with(state, robot, route=routes[robot])
     state = replace(state, allocating=False, rounds=event.round, unassigned=dict(event.unassigned))
-    actions: tuple[Action, ...] = tuple(
-        Plan(robot, "allocated") for robot in changed if state.robots[robot].route
-    )
+    # A route that was taken away is planned too: its robot must not drive on.
+    actions: tuple[Action, ...] = tuple(Plan(robot, "allocated") for robot in changed)
     if state.dirty:
         state, more = _allocate(state)
         return state, actions + more
@@ -226,18 +229,20 @@ def _fits(state: State, robot: str, route: Route) -> bool:
 
 
 def _planned(state: State, event: Planned) -> tuple[State, tuple[Action, ...]]:
+    robot, task = state.robots[event.robot], event.unreachable
+    if not robot.route:
+        return state, _finish_if_still(state)
     if event.length is not None:
         return state, (Drive(event.robot),)
-    robot, task = state.robots[event.robot], event.unreachable
     # Without that task the rest may still be possible: what is carried stays, the rest goes back.
-    carrying = tuple(id for id in robot.carrying if id != task)
     if task in robot.carrying:
         why = f"carried by {event.robot}, which has no way to its delivery"
         state = replace(state, stranded={**state.stranded, task: why})
     elif task is not None:
         state = replace(state, refused=state.refused | {(event.robot, task)})
-    route = tuple(stop for stop in robot.route if stop.task in carrying)
-    state = _with(state, event.robot, route=route, carrying=carrying)
+    kept = set(robot.carrying) - state.stranded.keys()
+    route = tuple(stop for stop in robot.route if stop.task in kept)
+    state = _with(state, event.robot, route=route)
     actions: tuple[Action, ...] = (Plan(event.robot, event.reason),) if route else ()
     state, more = _allocate(state)
     return state, actions + more
