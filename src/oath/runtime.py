@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -27,6 +28,7 @@ from oath.errors import BadInput
 from oath.events import (
     Allocated,
     AnyEvent,
+    Event,
     MissionFinished,
     MissionStarted,
     Moved,
@@ -41,15 +43,17 @@ from oath.motion.mission_automaton import Rules, compile_rules
 from oath.motion.planner import Planner, Service
 from oath.world.passages import missed
 from oath.world.roadmap import Params, World, build
+from oath.world.travel import TravelCosts
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A mission made ready: its roadmap with every stop on it, and its rules compiled."""
+    """A mission made ready: its roadmap with every stop on it, its rules, its travel costs."""
 
     mission: Mission
     world: World
     rules: Rules
+    travel: TravelCosts
 
 
 def prepare(mission: Mission, params: Params | None = None, seed: int = 0) -> Scene:
@@ -62,7 +66,8 @@ def prepare(mission: Mission, params: Params | None = None, seed: int = 0) -> Sc
     """
     known = {*mission.zones, *mission.places, *(task.id for task in mission.tasks)}
     rules = compile_rules(mission.rules, known, file=mission.source)
-    return Scene(mission, build(mission, params, seed, relevant=rules.relevant), rules)
+    world = build(mission, params, seed, relevant=rules.relevant)
+    return Scene(mission, world, rules, TravelCosts(world.roadmap, rules.avoid))
 
 
 def unreachable(scene: Scene) -> dict[str, str]:
@@ -117,10 +122,7 @@ def pose(scene: Scene, state: State) -> Problem:
     stranded = [sum(t in state.stranded for t in state.robots[r.id].carrying) for r in robots]
     routed = [state.robots[robot.id].route for robot in robots]
     nodes = list(places)
-    cost = [
-        world.roadmap.travel(mode, nodes, nodes, scene.rules.avoid)
-        for mode in range(len(world.roadmap.modes))
-    ]
+    cost = [scene.travel.between(mode, nodes) for mode in range(len(world.roadmap.modes))]
     return Problem(
         robots=tuple(robot.id for robot in robots),
         tasks=tuple(task.id for task in tasks),
@@ -272,16 +274,19 @@ class Runtime:
         return Result(dict(last.summary), tuple(self._events), self._scene)
 
     def _apply(self, events: Sequence[AnyEvent]) -> None:
-        """Apply events, and what the actions they call for answer, in order."""
-        queue = list(events)
-        while queue:
-            event = queue.pop(0)
-            self._on_event(event)
-            self._events.append(event)
-            self._track(event)
-            self._state, actions = advance(self._state, event)
-            for action in actions:
-                queue += self._perform(action)
+        """Apply events in order, each with all that follows from it before the next."""
+        # What is computed for one state must not wait until another event has changed it.
+        work: deque[AnyEvent | Action] = deque(events)
+        while work:
+            item = work.popleft()
+            if isinstance(item, Event):
+                self._on_event(item)
+                self._events.append(item)
+                self._track(item)
+                self._state, actions = advance(self._state, item)
+                work.extendleft(reversed(actions))
+            else:
+                work.extendleft(reversed(self._perform(item)))
 
     def _track(self, event: AnyEvent) -> None:
         if isinstance(event, Moved):
@@ -304,7 +309,7 @@ class Runtime:
                 for planner in self._planners.values():
                     planner.update(edges)
             case Finish():
-                return [self._finished()]
+                pass  # `run` ends when no robot reports anything any more
         return []
 
     def _allocate(self) -> Allocated:
@@ -345,7 +350,7 @@ class Runtime:
             seconds=seconds,
             length=length if blocked is None else None,
             reason=reason,
-            unreachable=route[blocked].task if blocked is not None else None,
+            unreachable=route[blocked].task if blocked is not None and route else None,
         )
 
     def _services(self, robot: str) -> list[Service]:
