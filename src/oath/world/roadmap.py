@@ -81,6 +81,7 @@ class Roadmap:
         self.graph = _core.Graph(len(modes))
         self._sequence = Halton(workspace.bounds, rng)
         self._node_at: dict[Point, int] = {}
+        self.version = 0  # rises whenever a cost or an edge changes
         self._around: set[Point] = set()  # corner nodes of obstacles that were added
         begin = time.perf_counter()
         motions = [mode.motion for mode in modes]
@@ -255,8 +256,9 @@ class Roadmap:
         tree = cKDTree(self.nodes()[self._corners])
         _, near = tree.query(points, k=min(self.params.sights, len(self._corners)))
         near = self._corners[near.reshape(len(points), -1)]
-        pairs = np.stack([np.repeat(nodes, near.shape[1]), near.ravel()], axis=1)
-        return pairs[pairs[:, 0] != pairs[:, 1]].astype(np.int64)
+        pairs = np.stack([np.repeat(nodes, near.shape[1]), near.ravel()], axis=1).astype(np.int64)
+        different: NDArray[np.int64] = pairs[pairs[:, 0] != pairs[:, 1]]
+        return different
 
     def _append(self, points: Array, *, bridges_only: bool = False) -> None:
         """Append nodes and join each to the nodes in sight in any mode."""
@@ -296,6 +298,7 @@ class Roadmap:
 
     def _price(self, edges: NDArray[np.int32], a: Array, b: Array) -> NDArray[np.bool_]:
         """Set the costs of edges with these ends in every mode; tell which changed."""
+        self.version += 1
         changed = np.zeros(len(edges), dtype=np.bool_)
         for m, mode in enumerate(self.modes):
             costs = np.full(len(edges), _core.UNREACHABLE, dtype=np.int64)

@@ -279,8 +279,8 @@ def _boundary(grid: OccupancyGrid) -> Array:
     for line, first, last, turned in ((*across, False), (*along, True)):
         ends = np.stack([first, line, last, line], axis=1).reshape(-1, 2)
         parts.append(ends[:, ::-1] if turned else ends)
-    ends = np.concatenate(parts) * size
-    return np.ascontiguousarray(ends + np.array([x, y]))
+    lattice = np.concatenate(parts)
+    return np.ascontiguousarray(lattice * size + np.array([x, y]))
 
 
 def _runs(flags: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
