@@ -83,6 +83,9 @@ class Roadmap:
         self._node_at: dict[Point, int] = {}
         self.version = 0  # rises whenever a cost or an edge changes
         self._around: set[Point] = set()  # corner nodes of obstacles that were added
+        # Whether a sample joins two components is asked for every one of thousands.
+        self._components: dict[int, NDArray[np.int32]] = {}
+        self._components_of = (-1, -1)
         begin = time.perf_counter()
         motions = [mode.motion for mode in modes]
         nodes = sample(workspace, motions, params.points, params.density, rng)
@@ -122,11 +125,15 @@ class Roadmap:
 
     def components(self, mode: int) -> NDArray[np.int32]:
         """Component (n,) of every node over the edges open in a mode."""
-        a, b = self.edges(mode).T
         n = self.graph.size
-        matrix = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(n, n))
-        labels: NDArray[np.int32] = connected_components(matrix, directed=False)[1]
-        return labels
+        if self._components_of != (self.version, n):
+            self._components_of = (self.version, n)
+            self._components.clear()
+        if mode not in self._components:
+            a, b = self.edges(mode).T
+            matrix = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(n, n))
+            self._components[mode] = connected_components(matrix, directed=False)[1]
+        return self._components[mode]
 
     def parts(self, mode: int) -> int:
         """How many parts the edges open in a mode fall into; nodes without such an edge are none.
