@@ -335,6 +335,25 @@ def test_planners_that_share_a_roadmap_do_not_disturb_each_other(
         other.replan()
 
 
+@settings(max_examples=60, deadline=None)
+@given(seed=SEEDS)
+def test_repairs_use_the_edges_of_stops_inserted_by_others(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    roadmap = small_roadmap(random_map(rng, obstacles=0), points=15, corners=False)
+    start, rules = random_point(rng), rules_of(())
+    run = Run(
+        roadmap,
+        rules,
+        Planner(roadmap, rules, 0, start),
+        [Service(at=random_point(rng), own=f"t{i}") for i in range(2)],
+    )
+    run.check(run.planner.begin(start, run.services))
+    for _ in range(5):
+        for _ in range(3):
+            roadmap.insert(random_point(rng))
+        run.replan()
+
+
 def test_a_new_route_begins_where_the_robot_is_and_keeps_the_rules_state() -> None:
     zones = {"lab": ((6, 0), (8, 0), (8, 8), (6, 8)), "key": ((0, 6), (2, 6), (2, 8), (0, 8))}
     rules = rules_of(("!lab W key",))
