@@ -603,3 +603,11 @@ def test_shifting_anything_breaks_a_run(run: tuple[Mission, Log], data: st.DataO
         assert isinstance(event, ev.StopServed)
         changed = replace(event, at=(event.at[0], event.at[1] - 0.01))
     assert not judge([*log[:at], changed, *log[at + 1 :]], mission).ok
+
+
+@pytest.mark.parametrize(("motion", "ok"), [("ground", True), ("drone", False)])
+def test_what_touches_a_robot_is_found_whether_it_sees_so_far_or_not(motion: str, ok: bool) -> None:
+    blind = robot("g", (6.685, 6.5), motion=motion, radius=0.3, sensing=0.1)
+    mission = replace(yard(), robots=(blind,), tasks=(), rules=())
+    found = ev.ObstacleFound(t=0.0, robot="g", obstacle="bush", polygon=BUSH)
+    assert rules(judge([started(), found], mission)) == (set() if ok else {"sensing"})

@@ -17,11 +17,14 @@ import shapely
 from numpy.typing import NDArray
 
 from oath.events import ObstacleFound
-from oath.model import Map, OccupancyGrid, Point
+from oath.model import Map, Obstacle, OccupancyGrid, Point
 from oath.verify.record import TOLERANCE, Life, Record, Track, Violation, apart
 
 SIGHT_STEP = 0.01
 """Distance between the points of an obstacle's outline that are tried for a line of sight [m]."""
+
+BUMPER = 0.02
+"""A robot notices what blocks it this near to its body, in sight or not [m]."""
 
 CELLS_AT_ONCE = 16
 """Length of the pieces [cells] in which a move is compared with a grid: the windows stay small."""
@@ -241,7 +244,7 @@ def _sensing_faults(record: Record) -> Iterator[Violation]:
         elif not shapely.equals(shapely.Polygon(event.polygon), _shape(life)):
             text += "its polygon is not the one in the mission"
         else:
-            problem = _unseen(record, record.tracks[event.robot], event.t, _shape(life))
+            problem = _unsensed(record, record.tracks[event.robot], event.t, life.obstacle)
             if problem is None:
                 known.add(event.obstacle)
                 continue
@@ -254,10 +257,14 @@ def _shape(life: Life) -> Any:
     return shapely.Polygon(life.obstacle.polygon)
 
 
-def _unseen(record: Record, track: Track, t: float, shape: Any) -> str | None:
-    """Return why a robot cannot have sensed a shape at time `t` [s], None if it can."""
+def _unsensed(record: Record, track: Track, t: float, obstacle: Obstacle) -> str | None:
+    """Return why a robot cannot have sensed an obstacle at time `t` [s], None if it can."""
     eye, sensing = np.array(track.at(t)), track.robot.sensing
+    shape = shapely.Polygon(obstacle.polygon)
     gap = float(shapely.distance(shapely.Point(eye), shape))
+    blocks = record.mission.motions[track.robot.motion].blocked_by(obstacle.kind)
+    if blocks and gap <= track.robot.radius + BUMPER + TOLERANCE:
+        return None
     if gap > sensing + TOLERANCE:
         return f"it is {gap:.6g} m from {_xy(eye)}; the robot senses {sensing:.6g} m"
     if gap == 0.0:
