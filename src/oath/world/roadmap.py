@@ -243,14 +243,19 @@ class Roadmap:
         ]
         return np.array(points, dtype=float).reshape(-1, 2)
 
-    def _in_sight(self, at: Array, mode: Mode) -> NDArray[np.intp]:
-        """Nearest nodes to which a robot can drive straight; looks further while it finds none."""
+    def _in_sight(self, at: Array, mode: Mode, *, bare: bool = False) -> NDArray[np.intp]:
+        """Nearest nodes to which a robot can drive straight; looks further while it finds none.
+
+        `bare` sees through whatever may go away again.
+        """
+        workspace = self.workspace
+        blocked = workspace.permanent() if bare else workspace.blocked(mode.motion)
         look = 4 * self.params.links
         nodes = self.nodes()
         while True:
             near = self.graph.nearest(at[0], at[1], look)
             a = np.repeat(at[None], len(near), axis=0)
-            free = self.workspace.free(a, nodes[near], mode)
+            free = workspace.core.free(a, nodes[near], mode.radius, blocked).astype(np.bool_)
             seen = np.asarray(near[free], dtype=np.intp)
             if len(seen) or look >= min(self.graph.size, 4096):
                 return seen[: self.params.links]
@@ -268,12 +273,18 @@ class Roadmap:
         return different
 
     def _append(self, points: Array, *, bridges_only: bool = False) -> None:
-        """Append nodes and join each to the nodes in sight in any mode."""
+        """Append nodes and join each to the nodes in sight in any mode.
+
+        Those in sight once all obstacles are gone are joined too, by edges that are blocked until
+        then: a stop under an obstacle must not stay cut off when the obstacle is taken away.
+        """
         for at in points:
             seen = [self._in_sight(at, mode) for mode in self.modes]
-            joined = np.unique(np.concatenate(seen)) if seen else np.empty(0, dtype=np.intp)
             if bridges_only and not self._joins(seen):
                 continue
+            if self.workspace.obstacles:
+                seen += [self._in_sight(at, mode, bare=True) for mode in self.modes]
+            joined = np.unique(np.concatenate(seen)) if seen else np.empty(0, dtype=np.intp)
             self.graph.add_nodes(at[None])
             new = np.array([self.graph.size - 1])
             pairs = np.stack([np.repeat(new, len(joined)), joined], axis=1)
