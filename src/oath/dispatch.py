@@ -218,13 +218,12 @@ def _is_served(state: State, robot: str, stop: RouteStop) -> bool:
 
 
 def _fits(state: State, robot: str, route: Route) -> bool:
-    """Whether a route delivers all that its robot carries, and takes up only what it may."""
-    carrying = state.robots[robot].carrying
+    """Whether a route delivers all that its robot can, and takes up only what it may."""
+    carrying = set(state.robots[robot].carrying) - state.stranded.keys()
     tasks = {stop.task for stop in route}
     may_begin = set(state.open_tasks())
-    return all(task in tasks or task in state.stranded for task in carrying) and all(
-        task in carrying or (task in may_begin and (robot, task) not in state.refused)
-        for task in tasks
+    return carrying <= tasks and all(
+        task in may_begin and (robot, task) not in state.refused for task in tasks - carrying
     )
 
 

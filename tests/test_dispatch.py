@@ -1,0 +1,501 @@
+"""Dispatch is pure, loses no task whatever happens, and answers each event as it should."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from copy import deepcopy
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import oath
+from missions import cell, delivery, gate, missions, random_mission, robot, visit, yard
+from oath import events as ev
+from oath.dispatch import (
+    Action,
+    Allocate,
+    Drive,
+    Finish,
+    Plan,
+    Repair,
+    RobotState,
+    State,
+    UpdateMap,
+    advance,
+)
+from oath.errors import BadInput
+from oath.model import Mission, Route, RouteStop
+from oath.runtime import summarise
+
+DOOR = ((6.9, 3.9), (7.1, 3.9), (7.1, 6.1), (6.9, 6.1))
+
+
+def route(*stops: str) -> Route:
+    """Return a route: ``+a`` picks a up, ``-a`` delivers it, ``a`` visits."""
+    names = {"+": "pickup", "-": "delivery"}
+    return tuple(
+        RouteStop(task=stop.lstrip("+-"), stop=names.get(stop[0], "visit"))  # type: ignore[arg-type]
+        for stop in stops
+    )
+
+
+def pair() -> Mission:
+    return yard(
+        [robot("r1", (1, 1)), robot("r2", (9, 9))],
+        [delivery("a", (2, 2), (3, 3)), delivery("b", (4, 4), (5, 5)), visit("c", (6, 6))],
+    )
+
+
+def state(**changes: Any) -> State:
+    return replace(State.of(pair()), **changes)
+
+
+def allocated(
+    routes: dict[str, Route], t: float = 0.0, round: int = 1, **unassigned: str
+) -> ev.Allocated:
+    return ev.Allocated(t=t, round=round, seconds=0.1, routes=routes, unassigned=unassigned)
+
+
+def planned(
+    robot: str,
+    length: float | None = 1.0,
+    unreachable: str | None = None,
+    reason: Any = "allocated",
+) -> ev.Planned:
+    return ev.Planned(
+        t=1.0, robot=robot, seconds=0.1, length=length, reason=reason, unreachable=unreachable
+    )
+
+
+def served(robot: str, stop: RouteStop, t: float = 2.0, at: Any = (0, 0)) -> ev.StopServed:
+    return ev.StopServed(t=t, robot=robot, task=stop.task, stop=stop.stop, at=at)
+
+
+def routed(state: State) -> list[str]:
+    """Tasks that are in a route but not begun, once for every robot that has them."""
+    return [
+        task
+        for robot in state.robots.values()
+        for task in dict.fromkeys(stop.task for stop in robot.route)
+        if task in state.open_tasks()
+    ]
+
+
+def check_partition(state: State) -> None:
+    parts = [
+        *state.completed,
+        *state.carried(),
+        *state.stranded,
+        *routed(state),
+        *state.waiting(),
+    ]
+    assert sorted(parts) == sorted(state.tasks)
+    for id, one in state.robots.items():
+        for task in one.carrying:
+            due = RouteStop(task=task, stop="delivery") in one.route
+            assert due == (task not in state.stranded), (id, task)
+        for stop in one.route:
+            if stop.stop == "delivery":
+                to_pick_up = RouteStop(task=stop.task, stop="pickup") in one.route
+                assert to_pick_up == (stop.task not in one.carrying), (id, stop)
+        assert len(set(one.route)) == len(one.route)
+
+
+def pure(state: State, event: ev.AnyEvent) -> tuple[State, tuple[Action, ...]]:
+    """Advance, and see that nothing was changed on the way and that the answer is no accident."""
+    state_before, event_before = deepcopy(state), deepcopy(event)
+    answer = advance(state, event)
+    assert state == state_before
+    assert event == event_before
+    assert advance(deepcopy(state), deepcopy(event)) == answer
+    return answer
+
+
+# --- Each event -----------------------------------------------------------------------------
+
+
+def started(t: float = 0.0) -> ev.MissionStarted:
+    return ev.MissionStarted(t=t, mission="yard", allocator="oath", seed=0)
+
+
+def test_a_mission_begins_with_a_round() -> None:
+    after, actions = pure(state(), started())
+    assert actions == (Allocate(),)
+    assert after == state(allocating=True)
+
+
+def test_new_routes_are_planned_and_kept_ones_are_not() -> None:
+    kept = state(
+        allocating=True, robots={"r1": RobotState(position=(1, 1), route=route("c")), "r2": idle()}
+    )
+    answer = allocated({"r1": route("c"), "r2": route("+a", "-a")}, b="waits for a robot")
+    after, actions = pure(kept, answer)
+    assert actions == (Plan("r2", "allocated"),)
+    assert after.robots["r2"].route == route("+a", "-a")
+    assert (after.rounds, after.allocating, after.unassigned) == (
+        1,
+        False,
+        {"b": "waits for a robot"},
+    )
+    assert after.unserved()["b"] == "waits for a robot"
+
+
+def idle() -> RobotState:
+    return RobotState(position=(9, 9))
+
+
+def test_a_round_that_gives_nothing_to_idle_robots_ends_the_mission() -> None:
+    after, actions = pure(state(allocating=True), allocated({"r1": (), "r2": ()}, a="why"))
+    assert actions == (Finish(),)
+    assert not after.finished
+    assert pure(after, ev.MissionFinished(t=3.0, summary={}))[0].finished
+
+
+def test_a_robot_whose_route_is_taken_away_is_planned_too() -> None:
+    busy = state(
+        allocating=True, robots={"r1": RobotState(position=(1, 1), route=route("c")), "r2": idle()}
+    )
+    after, actions = pure(busy, allocated({"r1": (), "r2": route("c")}))
+    assert actions == (Plan("r1", "allocated"), Plan("r2", "allocated"))
+    assert pure(after, planned("r1", length=0.0)) == (replace(after, t=1.0), ())
+
+
+def test_a_plan_is_driven() -> None:
+    ready = state(robots={"r1": RobotState(position=(1, 1), route=route("c")), "r2": idle()})
+    after, actions = pure(ready, planned("r1"))
+    assert actions == (Drive("r1"),)
+    assert after == replace(ready, t=1.0)
+
+
+def test_a_task_without_a_plan_is_refused_and_the_rest_goes_back() -> None:
+    ready = state(
+        robots={
+            "r1": RobotState(position=(1, 1), route=route("+a", "+b", "-a", "-b")),
+            "r2": idle(),
+        }
+    )
+    after, actions = pure(ready, planned("r1", None, "b"))
+    assert after.refused == {("r1", "b")}
+    assert after.robots["r1"].route == ()
+    assert after.waiting() == ("a", "b", "c")
+    assert actions == (Allocate(),)
+    assert after.allocating
+
+
+def test_what_is_carried_stays_when_another_task_has_no_plan() -> None:
+    loaded = RobotState(position=(1, 1), route=route("+b", "-a", "-b"), carrying=("a",))
+    after, actions = pure(state(robots={"r1": loaded, "r2": idle()}), planned("r1", None, "b"))
+    assert after.robots["r1"].route == route("-a")
+    assert after.carried() == {"a"}
+    assert actions == (Plan("r1", "allocated"), Allocate())
+
+
+def test_a_carried_task_without_a_plan_is_stranded_in_its_robots_hands() -> None:
+    loaded = RobotState(position=(1, 1), route=route("-a", "c"), carrying=("a",))
+    before = state(robots={"r1": loaded, "r2": idle()})
+    after, actions = pure(before, planned("r1", None, "a", "obstacle"))
+    assert after.stranded.keys() == {"a"}
+    assert "r1" in after.unserved()["a"]
+    assert after.carried() == frozenset()
+    assert after.refused == frozenset()
+    # It still takes room there.
+    assert after.robots["r1"] == replace(loaded, route=())
+    assert actions == (Allocate(),)
+    check_partition(after)
+
+
+def test_two_carried_tasks_strand_one_by_one() -> None:
+    loaded = RobotState(position=(1, 1), route=route("-a", "-b"), carrying=("a", "b"))
+    first, actions = pure(
+        state(robots={"r1": loaded, "r2": idle()}), planned("r1", None, "a", "obstacle")
+    )
+    assert first.robots["r1"].route == route("-b")
+    assert actions == (Plan("r1", "obstacle"), Allocate())
+    second, actions = pure(first, planned("r1", None, "b", "obstacle"))
+    assert second.stranded.keys() == {"a", "b"}
+    assert second.robots["r1"].route == ()
+    assert second.dirty
+    assert actions == ()
+
+
+def test_a_move_says_where_the_robot_is() -> None:
+    event = ev.Moved(t=4.0, robot="r1", from_=(1, 1), to=(1, 5), start=0.0, end=4.0)
+    after, actions = pure(state(), event)
+    assert actions == ()
+    assert after.t == 4.0
+    assert after.robots["r1"].position == (1, 5)
+    assert after.robots["r2"] == idle()
+
+
+def test_a_pickup_is_carried_and_the_robot_drives_on() -> None:
+    ready = state(robots={"r1": RobotState(position=(1, 1), route=route("+a", "-a")), "r2": idle()})
+    after, actions = pure(ready, served("r1", route("+a")[0], at=(2, 2)))
+    assert after.robots["r1"] == RobotState(position=(2, 2), route=route("-a"), carrying=("a",))
+    assert actions == (Drive("r1"),)
+    assert after.completed == frozenset()
+
+
+@pytest.mark.parametrize("last", ["-a", "c"])
+def test_the_last_stop_completes_a_task_and_asks_for_more(last: str) -> None:
+    task = last.lstrip("-")
+    carrying = ("a",) if task == "a" else ()
+    ready = state(
+        refused=frozenset({("r1", "b"), ("r2", "b")}),
+        robots={
+            "r1": RobotState(position=(1, 1), route=route(last), carrying=carrying),
+            "r2": idle(),
+        },
+    )
+    after, actions = pure(ready, served("r1", route(last)[0]))
+    assert after.completed == {task}
+    assert after.robots["r1"].carrying == ()
+    assert actions == (Allocate(),)
+    # What a rule forbade r1 may be allowed now; r2 did nothing new.
+    assert after.refused == {("r2", "b")}
+
+
+def test_the_last_task_of_all_ends_the_mission() -> None:
+    ready = state(
+        completed=frozenset("ab"),
+        robots={"r1": RobotState(position=(1, 1), route=route("c")), "r2": idle()},
+    )
+    assert pure(ready, served("r1", route("c")[0]))[1] == (Finish(),)
+
+
+def test_the_mission_does_not_end_while_somebody_drives_or_a_round_is_on() -> None:
+    busy = RobotState(position=(1, 1), route=route("-a"), carrying=("a",))
+    here = RobotState(position=(1, 1), route=route("c"))
+    ready = state(completed=frozenset("b"), robots={"r1": here, "r2": busy})
+    assert pure(ready, served("r1", route("c")[0]))[1] == ()
+    alone = state(completed=frozenset("ab"), robots={"r1": here, "r2": idle()}, allocating=True)
+    assert pure(alone, served("r1", route("c")[0]))[1] == ()
+
+
+def test_a_find_goes_on_the_map_before_anybody_repairs() -> None:
+    ready = state(robots={"r1": RobotState(position=(1, 1), route=route("c")), "r2": idle()})
+    event = ev.ObstacleFound(t=1.0, robot="r2", obstacle="bush-1", polygon=DOOR)
+    assert pure(ready, event)[1] == (UpdateMap("bush-1"), Repair("r1", "bush-1"))
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        ev.Commanded(t=5.0, command={"intent": "undo"}, source="operator"),
+        ev.RobotPaused(t=5.0, robot="r1"),
+        ev.ObstacleRemoved(t=5.0, obstacle="x"),
+    ],
+)
+def test_other_events_only_move_the_clock(event: ev.AnyEvent) -> None:
+    assert pure(state(), event) == (state(t=5.0), ())
+
+
+def test_the_clock_never_goes_back() -> None:
+    assert pure(state(t=9.0), started(2.0))[0].t == 9.0
+
+
+# --- One round at a time --------------------------------------------------------------------
+
+
+def test_only_one_round_is_in_flight_and_changes_ask_for_another() -> None:
+    on = state(
+        allocating=True, robots={"r1": RobotState(position=(1, 1), route=route("c")), "r2": idle()}
+    )
+    changed, actions = pure(on, served("r1", route("c")[0]))
+    assert actions == ()
+    assert changed.dirty
+    after, actions = pure(changed, allocated({"r1": route("c"), "r2": route("+a", "-a")}))
+    assert actions == (Plan("r2", "allocated"), Allocate())
+    assert (after.allocating, after.dirty) == (True, False)
+    # c was done while the round was computed.
+    assert after.robots["r1"].route == ()
+    check_partition(after)
+
+
+def test_a_late_answer_does_not_revive_a_refused_task() -> None:
+    on = state(
+        allocating=True, robots={"r1": RobotState(position=(1, 1), route=route("c")), "r2": idle()}
+    )
+    refused, _ = pure(on, planned("r1", None, "c"))
+    after, _ = pure(refused, allocated({"r1": route("c"), "r2": ()}))
+    assert after.robots["r1"].route == ()
+    assert after.waiting() == ("a", "b", "c")
+
+
+def test_a_late_answer_does_not_take_what_was_picked_up_meanwhile() -> None:
+    on = state(
+        allocating=True,
+        robots={"r1": RobotState(position=(1, 1), route=route("+a", "-a")), "r2": idle()},
+    )
+    loaded, _ = pure(on, served("r1", route("+a")[0]))
+    after, _ = pure(loaded, allocated({"r1": (), "r2": route("+a", "-a")}))
+    assert after.robots["r1"].route == route("-a")
+    assert after.robots["r2"].route == ()
+    check_partition(after)
+
+
+# --- Laws -----------------------------------------------------------------------------------
+
+
+class Chaos:
+    """Answers dispatch's actions late, in any order, and as badly as the seams allow."""
+
+    def __init__(self, mission: Mission, seed: int) -> None:
+        self.rng = random.Random(seed)
+        self.mission = mission
+        self.state = State.of(mission)
+        self.asked: State | None = None
+        """The state that the round in flight was asked for."""
+        self.plans: list[tuple[str, Any]] = []
+        self.driving: set[str] = set()
+        self.finds = 3
+        self.finishes = 0
+
+    def run(self) -> None:
+        self.apply(started())
+        for _ in range(400):
+            event = self.next_event()
+            if event is None:
+                break
+            self.apply(event)
+        else:
+            pytest.fail("the mission does not end")
+        # Nothing is in flight any more: dispatch must have said that this is the end.
+        assert self.finishes >= 1
+        assert not self.state.allocating
+        assert not any(robot.route for robot in self.state.robots.values())
+
+    def apply(self, event: ev.AnyEvent) -> None:
+        self.state, actions = pure(self.state, event)
+        check_partition(self.state)
+        for action in actions:
+            match action:
+                case Allocate():
+                    assert self.asked is None, "two rounds are in flight"
+                    self.asked = self.state
+                case Plan(robot, reason) | Repair(robot, reason):
+                    self.driving.discard(robot)
+                    known = reason if isinstance(action, Plan) else "obstacle"
+                    self.plans.append((robot, known))
+                case Drive(robot):
+                    assert self.state.robots[robot].route, f"{robot} is sent nowhere"
+                    self.driving.add(robot)
+                case Finish():
+                    self.finishes += 1
+        assert self.state.allocating == (self.asked is not None)
+
+    def next_event(self) -> ev.AnyEvent | None:
+        choices: list[ev.AnyEvent] = [*self.stops(), *self.planning()]
+        if self.asked is not None:
+            choices.append(self.answer(self.asked))
+        if not choices:
+            return None
+        if self.finds and self.rng.random() < 0.1:
+            self.finds -= 1
+            finder = self.rng.choice(self.mission.robots).id
+            return ev.ObstacleFound(t=self.state.t, robot=finder, obstacle="x", polygon=DOOR)
+        event = self.rng.choice(choices)
+        if isinstance(event, ev.Allocated):
+            self.asked = None
+        if isinstance(event, ev.Planned):
+            self.plans.remove((event.robot, event.reason))
+        return event
+
+    def stops(self) -> list[ev.AnyEvent]:
+        t = self.state.t + self.rng.random()
+        return [
+            served(robot, self.state.robots[robot].route[0], t)
+            for robot in sorted(self.driving)
+            if self.state.robots[robot].route
+        ]
+
+    def planning(self) -> list[ev.AnyEvent]:
+        events: list[ev.AnyEvent] = []
+        for id, reason in self.plans:
+            left = self.state.robots[id].route
+            lost = self.rng.choice(left).task if left and self.rng.random() < 0.3 else None
+            events.append(planned(id, None if lost else 1.0, lost, reason))
+        return events
+
+    def answer(self, then: State) -> ev.Allocated:
+        """Return a sound answer to the state of when it was asked."""
+        routes: dict[str, Route] = {id: one.route for id, one in then.robots.items()}
+        open_ = list(then.waiting())
+        for id in routes:
+            if routes[id] and self.rng.random() < 0.7:
+                continue
+            can = [task for task in open_ if (id, task) not in then.refused]
+            if can and self.rng.random() < 0.8:
+                task = then.tasks[self.rng.choice(can)]
+                open_.remove(task.id)
+                routes[id] += tuple(RouteStop(task=task.id, stop=stop.name) for stop in task.stops)
+        # Some tasks that nobody has picked up yet change hands.
+        for one, other in pairwise(self.mission.robots):
+            mine = [s for s in routes[one.id] if s.task in then.open_tasks()]
+            if mine and self.rng.random() < 0.2:
+                task_id = mine[0].task
+                if (other.id, task_id) not in then.refused:
+                    moved = tuple(s for s in routes[one.id] if s.task == task_id)
+                    routes[one.id] = tuple(s for s in routes[one.id] if s.task != task_id)
+                    routes[other.id] += moved
+        return allocated(
+            routes, self.state.t, then.rounds + 1, **dict.fromkeys(open_, "waits for a robot")
+        )
+
+
+@settings(max_examples=150, deadline=None)
+@given(missions(), st.integers(0, 2**32 - 1))
+def test_no_task_is_lost_or_doubled_whatever_happens(mission: Mission, seed: int) -> None:
+    Chaos(mission, seed).run()
+
+
+def fold(mission: Mission, events: Sequence[ev.AnyEvent]) -> State:
+    state = State.of(mission)
+    for event in events:
+        state, _ = pure(state, event)
+        check_partition(state)
+    return state
+
+
+def check_replay(mission: Mission, **options: Any) -> State:
+    result = oath.run(mission, **options)
+    *before, last = result.events
+    state = fold(mission, before)
+    assert summarise(mission, state, before) == result.summary
+    assert isinstance(last, ev.MissionFinished)
+    assert [event for event in before if isinstance(event, ev.MissionFinished)] == []
+    return fold(mission, result.events)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_the_events_of_a_run_rebuild_its_state(seed: int) -> None:
+    try:
+        state = check_replay(random_mission(seed), seed=seed, points=100)
+    except BadInput:  # a stop is out of reach
+        return
+    assert state.finished
+    assert not state.carried()
+
+
+def test_the_events_of_a_shipped_mission_rebuild_its_state() -> None:
+    mission = oath.load("missions/maze-25-gates.yaml")
+    assert check_replay(mission, seed=3).completed == {task.id for task in mission.tasks}
+
+
+def test_a_run_with_a_stranded_task_rebuilds_its_state() -> None:
+    mission = cell(
+        [robot("r1", (5.2, 5))],
+        [delivery("a", (5, 5), (9, 5)), visit("b", (1, 1)), delivery("c", (1, 1), (3, 3))],
+        obstacles=(gate("gate-1", DOOR),),
+    )
+    # Blind until it touches the gate: it has picked a up by then.
+    mission = replace(mission, robots=(replace(mission.robots[0], sensing=0.5),))
+    state = check_replay(mission, points=200)
+    assert state.stranded.keys() == {"a"}
+    assert state.completed == {"b"}
+    assert state.unserved()["c"] == "no room: the robots that could take it are full"
