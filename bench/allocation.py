@@ -41,6 +41,9 @@ def random_problem(tasks: int, robots: int, capacity: int, seed: int) -> Problem
         mode=np.zeros(robots, dtype=np.int32),
         busy=np.zeros(robots, dtype=np.bool_),
         routes=((),) * robots,
+        types=("light", "heavy"),
+        priority=np.zeros(tasks, dtype=np.int8),
+        refused=np.zeros((robots, tasks), dtype=np.bool_),
     )
 
 
