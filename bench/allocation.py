@@ -44,6 +44,7 @@ def random_problem(tasks: int, robots: int, capacity: int, seed: int) -> Problem
         types=("light", "heavy"),
         priority=np.zeros(tasks, dtype=np.int8),
         refused=np.zeros((robots, tasks), dtype=np.bool_),
+        max_tasks=np.full(robots, tasks, dtype=np.int32),
     )
 
 

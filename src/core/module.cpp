@@ -6,6 +6,7 @@ namespace nb = nanobind;
 void bind_graph(nb::module_& m);
 void bind_planner(nb::module_& m);
 void bind_pull(nb::module_& m);
+void bind_search(nb::module_& m);
 void bind_selection(nb::module_& m);
 void bind_workspace(nb::module_& m);
 
@@ -15,5 +16,6 @@ NB_MODULE(_core, m) {
     bind_graph(m);
     bind_planner(m);
     bind_pull(m);
+    bind_search(m);
     bind_selection(m);
 }

@@ -152,7 +152,13 @@ Route = tuple[RouteStop, ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assignment:
-    """The routes of all robots, and why each task outside of them is unassigned."""
+    """The routes of all robots, and why each task outside of them is unassigned.
+
+    A solver that proves something says so: no assignment of the same tasks has an objective below
+    `lower_bound`, and `optimal` ones reach it.
+    """
 
     routes: Mapping[str, Route]
     unassigned: Mapping[str, str]
+    lower_bound: float | None = None
+    optimal: bool = False

@@ -146,6 +146,7 @@ def pose(scene: Scene, state: State) -> Problem:
         ).reshape(len(robots), len(tasks)),
         routes=tuple(routed),
         types=tuple(types),
+        max_tasks=np.full(len(robots), max(1, len(tasks)), dtype=np.int32),
         priority=np.array([_RANK[task.priority] for task in tasks], dtype=np.int8),
     )
 

@@ -46,6 +46,7 @@ def line(
         types=tuple("abcdefg"[: len(capability[0]) if r else 1]),
         priority=np.zeros(p, dtype=np.int8),
         refused=np.zeros((r, p), dtype=np.bool_),
+        max_tasks=np.full(r, max(1, p), dtype=np.int32),
     )
 
 
@@ -92,4 +93,5 @@ def problems(draw: st.DrawFn, *, robots: int = 4, tasks: int = 12, wild: bool = 
         types=tuple("abc"[:t]),
         priority=np.zeros(p, dtype=np.int8),
         refused=np.zeros((r, p), dtype=np.bool_),
+        max_tasks=np.full(r, max(1, p), dtype=np.int32),
     )

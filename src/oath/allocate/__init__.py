@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from oath.allocate.contract import Allocator, Budget, checked, reasons
+from oath.allocate.lns import Lns
 from oath.allocate.oath import Oath
 from oath.allocate.priority import ByPriority
 from oath.allocate.problem import WAITING, Problem
@@ -20,6 +21,7 @@ __all__ = [
     "WAITING",
     "Allocator",
     "Budget",
+    "Lns",
     "ByPriority",
     "Oath",
     "Problem",
@@ -31,7 +33,7 @@ __all__ = [
     "urgent",
 ]
 
-ALLOCATORS: dict[str, Callable[[], Allocator]] = {"oath": Oath}
+ALLOCATORS: dict[str, Callable[[], Allocator]] = {"lns": Lns, "oath": Oath}
 """Every allocator by its name, with its default parameters."""
 
 

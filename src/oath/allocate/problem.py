@@ -55,6 +55,8 @@ class Problem:
     """(P,) 1 = high, 0 = normal, -1 = low."""
     refused: NDArray[np.bool_]
     """(R, P) the robot was found unable to do the task, e.g. because a rule forbids it."""
+    max_tasks: NDArray[np.int32]
+    """(R,) tasks a robot may be given in all; the single-round problem has its capacity here."""
 
     def feasible(self) -> NDArray[np.bool_]:
         """(R, P): the robot can do the type, has room, reaches pickup and from there delivery."""
