@@ -437,5 +437,54 @@ def verify(mission: Path, events: Path, as_json: bool) -> None:
         raise click.exceptions.Exit(1)
 
 
+@main.command(
+    epilog=_examples("oath bench optimality --quick", "oath bench all --out report --seeds 10")
+)
+@click.argument("study", metavar="STUDY")
+@click.option("--quick", is_flag=True, help="A sketch in about a minute.")
+@click.option("--seeds", default=5, show_default=True, type=click.IntRange(1), help="Repetitions.")
+@click.option(
+    "--out",
+    default=Path("bench-out"),
+    show_default=True,
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for tables, plots and what is finished so far.",
+)
+def bench(study: str, quick: bool, seeds: int, out: Path) -> None:
+    """Run a study of the paper, or all of them, and write tables, plots and a report.
+
+    An interrupted study goes on where it stopped. STUDY is one of: sampling, tuning, clusters,
+    types, selection, efficiency, endtoend, optimality, scaling, automaton, all.
+    """
+    from oath import bench as studies
+
+    names = list(studies.STUDIES) if study == "all" else [study]
+    chosen = [studies.study(name) for name in names]
+    outcomes = []
+    for one in chosen:
+        with _counting(one.title) as show:
+            folder = out / ("quick" if quick else f"seeds-{seeds}")
+            outcome = studies.run_study(one, folder, quick=quick, seeds=seeds, on_progress=show)
+        outcomes.append(outcome)
+        click.echo(f"{one.title}\n\n{studies.markdown(outcome.table)}\n\n{outcome.finding}")
+        click.echo(f"The paper: {one.paper}\nsee {outcome.png}, {outcome.csv}\n")
+    if study == "all":
+        command = "oath bench all" + (" --quick" if quick else f" --seeds {seeds}")
+        studies.report(outcomes, folder / "report.md", command=command)
+        click.echo(f"see {folder / 'report.md'}")
+
+
+@contextmanager
+def _counting(title: str) -> Iterator[Callable[[int, int], None]]:
+    """Show how many cases are done, and the time left, on a terminal only."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
+        job = bar.add_task(title, total=None)
+        yield lambda done, total: bar.update(job, completed=done, total=total)
+
+
 if __name__ == "__main__":
     main()
