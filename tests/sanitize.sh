@@ -20,11 +20,13 @@ cp "$build"/_core*.so "$package/oath/"
 cxx=$(sed -n 's/^CMAKE_CXX_COMPILER:[A-Z]*=//p' "$build/CMakeCache.txt")
 export PYTHONPATH="$package"
 export PYTHONMALLOC=malloc # so that overruns of Python's own buffers are seen
-export ASAN_OPTIONS=detect_leaks=0:halt_on_error=1
-export UBSAN_OPTIONS=print_stacktrace=1:halt_on_error=1
+# To a file, for pytest swallows what a dying process writes.
+export ASAN_OPTIONS="detect_leaks=0:halt_on_error=1:log_path=$package/report"
+export UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1:log_path=$package/report"
 preload="$("$cxx" -print-file-name=libasan.so):$("$cxx" -print-file-name=libubsan.so)"
 
-LD_PRELOAD="$preload" python - "$package" <<'PYTHON'
+status=0
+LD_PRELOAD="$preload" python - "$package" <<'PYTHON' || status=$?
 import sys
 
 import pytest
@@ -50,3 +52,10 @@ class FewExamples:
 tests = ["tests/world", "tests/motion/test_planner.py", "tests/allocate/test_selection.py"]
 sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "-m", "not slow", *tests], [FewExamples()]))
 PYTHON
+
+for report in "$package"/report.*; do
+  [ -e "$report" ] || continue
+  cat "$report" >&2
+  status=1
+done
+exit "$status"
