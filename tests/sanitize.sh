@@ -5,7 +5,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 build=build/sanitize
-cmake -S . -B "$build" -DOATH_SANITIZE=ON -DCMAKE_BUILD_TYPE=Release \
+cmake -S . -B "$build" -DOATH_SANITIZE=ON -DCMAKE_BUILD_TYPE=RelWithDebInfo \
   -DPython_EXECUTABLE="$(python -c 'import sys; print(sys.executable)')" \
   -Dnanobind_DIR="$(python -m nanobind --cmake_dir)" >/dev/null
 cmake --build "$build" -j 2 | tail -n 1
