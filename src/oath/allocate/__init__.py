@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from oath.allocate.cbba import Cbba
 from oath.allocate.contract import Allocator, Budget, checked, reasons
 from oath.allocate.greedy import Greedy
 from oath.allocate.kam import Kam
@@ -25,6 +26,7 @@ __all__ = [
     "Allocator",
     "Budget",
     "ByPriority",
+    "Cbba",
     "Greedy",
     "Kam",
     "Kan",
@@ -44,6 +46,7 @@ ALLOCATORS: dict[str, Callable[[], Allocator]] = {
     "oath": Oath,
     "kam": Kam,
     "kan": Kan,
+    "cbba": Cbba,
     "greedy": Greedy,
 }
 """Every allocator by its name, with its default parameters."""
