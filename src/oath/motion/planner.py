@@ -124,6 +124,15 @@ class Planner:
             points[-1] = self._services[self._leg].at
         return points
 
+    def to_go(self) -> float:
+        """How far it is to the current leg's stop [m], from where the robot was last seen."""
+        if not self._plan.legs:
+            return 0.0
+        way = self._plan.legs[0]
+        hops = np.hypot(*np.diff(way, axis=0).T)
+        here = int(np.argmin(np.hypot(*(way - np.array(self.position)).T)))
+        return float(hops[here:].sum())
+
     def moved(self, to: Point) -> None:
         """The robot drove straight from where it was to a point [m]."""
         self._states = self._after_driving_to(to)
