@@ -76,7 +76,8 @@ class Planner:
         core = self._searcher()
         states = self._after_driving_to(at)
         flags = [int(q in states) for q in range(self.rules.automaton.states)]
-        nodes, costs, labels = self.roadmap.links(at, self.mode)
+        goals = [self.roadmap.insert(service.at) for service in self._services[self._leg :][:1]]
+        nodes, costs, labels = self.roadmap.links(at, self.mode, goals)
         if len(self.roadmap.zones.classes) > self._labels_known:
             core = self._searcher()
         if (edges := self.roadmap.graph.edges) > self._edges_known:  # others inserted their stops
