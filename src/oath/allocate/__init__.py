@@ -17,7 +17,7 @@ from oath.allocate.lns import Lns
 from oath.allocate.oath import Oath
 from oath.allocate.priority import ByPriority
 from oath.allocate.problem import WAITING, Problem
-from oath.allocate.rounds import plan_all, route_length, urgent
+from oath.allocate.rounds import follow, plan_all, urgent
 from oath.errors import BadInput, did_you_mean
 
 __all__ = [
@@ -35,9 +35,9 @@ __all__ = [
     "Problem",
     "allocator",
     "checked",
+    "follow",
     "plan_all",
     "reasons",
-    "route_length",
     "urgent",
 ]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,7 @@ class Cbba:
     """
 
     params: Params = Params()
+    reconsiders: ClassVar[bool] = False
 
     def allocate(self, problem: Problem, budget: Budget, rng: np.random.Generator) -> Assignment:
         """Give routes to idle robots; busy ones keep theirs.
