@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,13 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from problems import line, problems
 
+from oath import load
 from oath.allocate import ALLOCATORS, Budget, Greedy, Kam, Kan, Oath, Problem, checked, plan_all
 from oath.allocate.clustering import count, kmeans
 from oath.allocate.insertion import best_places
 from oath.allocate.kan import nearest_neighbour, to_centroids
+from oath.dispatch import State
 from oath.model import Assignment
+from oath.scene import pose, prepare
 from oracles import path_length
 
+MISSIONS = Path(__file__).parents[2] / "missions"
 BASELINES = ("cbba", "greedy", "kam", "kan")
 
 
@@ -67,6 +72,19 @@ def test_idle_robots_take_what_they_can_carry_and_busy_ones_nothing(
 def test_one_robot_one_task(name: str) -> None:
     answer = ask(ALLOCATORS[name](), line([0.0, 9.0], [(8, 5)]))
     assert names(answer, "r0") == [] and names(answer, "r1") == ["t0 pickup", "t0 delivery"]
+
+
+def test_missions_say_where_their_locations_are() -> None:
+    scene = prepare(load(MISSIONS / "maze-09.yaml"))
+    problem = pose(scene, State.of(scene.mission))
+    for task, first, last in zip(
+        scene.mission.tasks, problem.pickup, problem.delivery, strict=True
+    ):
+        assert problem.points[[first, last]] == pytest.approx(
+            np.array([task.stops[0].at, task.stops[-1].at])
+        )
+    legs = problem.points[:, None] - problem.points
+    assert (problem.cost >= np.hypot(legs[..., 0], legs[..., 1]) - 1e-3).all()
 
 
 # --- K-means ------------------------------------------------------------------------------------

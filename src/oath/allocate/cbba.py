@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oath.allocate.consensus import Agreement, Gain, agree, diameter
-from oath.allocate.contract import Budget, stop_names
-from oath.allocate.insertion import detours
+from oath.allocate.contract import Budget
+from oath.allocate.insertion import GrowingPath
 from oath.allocate.problem import Problem
 from oath.allocate.stages import assignment, open_to, quota
 from oath.errors import BadInput, did_you_mean
@@ -30,6 +30,8 @@ class Params:
     """What can be tuned."""
 
     network: Network = "complete"
+    together: bool = True
+    """A delivery follows its pickup at once; False lets the loads of a robot overlap."""
     rebuild: bool = True
     """Robots build their bundles anew each round, so that the network does not matter; False is the
     source's rule, see `agree`."""
@@ -39,10 +41,10 @@ class Params:
 class Cbba:
     """One round: idle robots win bundles of as many tasks as they can carry.
 
-    A task is one unit, as in the source: its delivery follows its pickup. A bid is worth minus the
-    length [m] by which the task's best insertion makes the robot's open path longer, plus a
-    constant that makes any insertion better than none; so total worth falls as total length rises.
-    Such gains need not diminish (a task may lie on the way to a later one), hence bids are warped.
+    A task is one unit, as in the source, unless `together` is switched off. A bid is minus the
+    length [m] that the task's best insertion adds to the robot's open path, plus a constant that
+    makes any insertion better than none; so total worth falls as total length rises. Such gains
+    need not diminish (a task may lie on the way to a later one), hence bids are warped.
     Busy robots pass on what they hear, but do not bid. Deterministic: it uses neither the budget
     nor the random numbers.
     """
@@ -58,18 +60,19 @@ class Cbba:
         BadInput
             The network names an unknown robot or leaves some apart.
         """
-        agreement = self.agreement(problem)
+        bundles = self.agreement(problem).bundles
+        together = self.params.together
         won = {
-            robot: tuple((task, name) for task in path for name in stop_names(problem, task))
-            for robot, path in enumerate(agreement.paths)
-            if path
+            robot: GrowingPath(problem, robot, bundle, together=together).picks()
+            for robot, bundle in enumerate(bundles)
+            if bundle
         }
         return assignment(problem, won)
 
     def agreement(self, problem: Problem) -> Agreement:
         """Return who won what, and after how many rounds."""
         return agree(
-            travel_gain(problem),
+            travel_gain(problem, together=self.params.together),
             len(problem.tasks),
             quota(problem).tolist(),
             links(self.params.network, problem.robots),
@@ -77,25 +80,26 @@ class Cbba:
         )
 
 
-def travel_gain(problem: Problem) -> Gain:
+def travel_gain(problem: Problem, *, together: bool = True) -> Gain:
     """Return the gains of idle robots: how much less than a constant a task adds to a path [m].
 
-    The constant is 1 m more than three of the longest ways, since an insertion adds three at most.
+    The constant is 1 m more than four of the longest ways, since an insertion adds four at most.
+
+    Parameters
+    ----------
+    together
+        See `Params`.
     """
     able = open_to(problem)
-    constant = 1.0 + 3.0 * float(np.max(problem.cost, where=np.isfinite(problem.cost), initial=0.0))
-    way = problem.cost[:, problem.pickup, problem.delivery]
-    way[:, problem.visit] = 0.0
+    constant = 1.0 + 4.0 * float(np.max(problem.cost, where=np.isfinite(problem.cost), initial=0.0))
+    known: dict[tuple[int, ...], NDArray[np.float64]] = {}
 
-    def gain(robot: int, path: Sequence[int]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-        mode, done = problem.mode[robot], np.array(path, dtype=np.intp)
-        leave = np.append(problem.start[robot], problem.delivery[done])
-        increase = detours(
-            problem.cost[mode], leave, problem.pickup[done], problem.pickup, problem.delivery
-        )
-        gains = constant - (increase.min(axis=0) + way[mode])
-        gains[~able[robot]] = 0.0
-        return gains, np.argmin(increase, axis=0)
+    def gain(robot: int, bundle: Sequence[int], /) -> NDArray[np.float64]:
+        key = (robot, *bundle)  # the same bundles come up round after round
+        if key not in known:
+            path = GrowingPath(problem, robot, bundle, together=together)
+            known[key] = np.where(able[robot], constant - path.prices, 0.0)
+        return known[key]
 
     return gain
 

@@ -33,12 +33,10 @@ PATIENCE = 10
 class Gain(Protocol):
     """What a task is worth to an agent that already has others."""
 
-    def __call__(
-        self, agent: int, path: Sequence[int], /
-    ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-        """Return (n,) gains of putting one more task into a path, and (n,) where it goes best.
+    def __call__(self, agent: int, bundle: Sequence[int], /) -> NDArray[np.float64]:
+        """Return (n,) what each task adds to the worth of a bundle, in the order it was won.
 
-        A task with a gain of 0 or less is not bid for.
+        A task that adds 0 or less is not bid for.
         """
         ...
 
@@ -49,8 +47,6 @@ class Agreement:
 
     bundles: tuple[tuple[int, ...], ...]
     """The tasks of each agent in the order in which they were won."""
-    paths: tuple[tuple[int, ...], ...]
-    """The same tasks in the order in which they are done."""
     rounds: int
     """Rounds until nothing changed any more."""
 
@@ -96,7 +92,6 @@ def agree(
             raise ProviderError(f"consensus: no agreement of {len(agents)} agents, {tasks} tasks")
     return Agreement(
         bundles=tuple(tuple(agent.bundle) for agent in agents),
-        paths=tuple(tuple(agent.path) for agent in agents),
         rounds=now - quiet,
     )
 
@@ -145,12 +140,11 @@ def diameter(linked: Mask) -> int:
 
 
 class _Agent:
-    """One agent: its bundle, its path, and what it believes of everyone."""
+    """One agent: its bundle, and what it believes of everyone."""
 
     def __init__(self, me: int, gain: Gain, tasks: int, most: int, agents: int) -> None:
         self.me, self.gain, self.most = me, gain, most
         self.bundle: list[int] = []
-        self.path: list[int] = []
         self.y = np.zeros(tasks)
         self.z = np.full(tasks, NOBODY, dtype=np.intp)
         self.s = np.zeros(agents, dtype=np.intp)
@@ -162,7 +156,7 @@ class _Agent:
     def build(self) -> None:
         """Add the best task that it can win, again and again (algorithm 3)."""
         while len(self.bundle) < self.most:
-            gains, places = self.gain(self.me, self.path)
+            gains = self.gain(self.me, self.bundle)
             # Warped: no bid exceeds an earlier one, as if the gains did diminish.
             bids = np.minimum(gains, min((self.y[task] for task in self.bundle), default=np.inf))
             wins = self._beats(bids, self.me) & (bids > 0)
@@ -173,7 +167,6 @@ class _Agent:
             best = np.flatnonzero(bids == bids.max())
             task = int(best[np.argmax(gains[best])])  # warped bids tie; the true gain decides
             self.bundle.append(task)
-            self.path.insert(int(places[task]), task)
             self.y[task], self.z[task] = bids[task], self.me
 
     def _beats(self, bids: NDArray[np.float64], bidder: NDArray[np.intp] | int) -> Mask:
@@ -225,7 +218,6 @@ class _Agent:
     def drop(self, start: int) -> None:
         """Give up the tasks of the bundle from some place on."""
         for task in self.bundle[start:]:
-            self.path.remove(task)
             if self.z[task] == self.me:
                 self.y[task], self.z[task] = 0.0, NOBODY
         del self.bundle[start:]

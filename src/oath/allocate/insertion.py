@@ -1,9 +1,16 @@
-"""What it costs to put one more task into a path, for all tasks and places at once."""
+"""Paths that grow task by task, each put where it adds least."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
+
+from oath.allocate.problem import Problem
+from oath.allocate.selection import Picks
+from oath.model import StopName
 
 Matrix = NDArray[np.float64]
 Locations = NDArray[np.integer]
@@ -43,7 +50,12 @@ def detours(
 
 
 def best_places(
-    cost: Matrix, path: Locations, first: Locations, last: Locations, visit: NDArray[np.bool_]
+    cost: Matrix,
+    path: Locations,
+    first: Locations,
+    last: Locations,
+    visit: NDArray[np.bool_],
+    whole: NDArray[np.bool_] | None = None,
 ) -> tuple[Matrix, NDArray[np.intp], NDArray[np.intp]]:
     """Return where both stops of each task go best: the increase [m], and two places (n,).
 
@@ -56,17 +68,81 @@ def best_places(
         (m + 1,) locations, the robot's own first.
     first, last, visit
         (n,) locations of the stops; whether there is only one.
+    whole
+        (m + 1,) where a task may go if its stops must stay together; None = anywhere, apart too.
     """
     gaps = len(path)
     way = np.where(visit, 0.0, cost[first, last])
+    together = detours(cost, path, path[1:], first, last) + way
+    if whole is not None:
+        together[~whole] = np.inf
+        i = np.argmin(together, axis=0)
+        return together[i, np.arange(len(first))], i, i
     apart = (
         detours(cost, path, path[1:], first, first)[:, None]
         + detours(cost, path, path[1:], last, last)[None]
     )
     apart[np.tril_indices(gaps)] = np.inf
     apart[:, :, visit] = np.inf
-    apart[np.diag_indices(gaps)] = detours(cost, path, path[1:], first, last) + way
+    apart[np.diag_indices(gaps)] = together
     flat = apart.reshape(gaps * gaps, -1)
     best = np.argmin(flat, axis=0)
     i, j = np.divmod(best, gaps)
     return flat[best, np.arange(len(first))], i, j
+
+
+class GrowingPath:
+    """The path of one robot, and what each task would add to it.
+
+    Parameters
+    ----------
+    together
+        A task's delivery follows its pickup at once; otherwise loads may overlap.
+    tasks
+        Inserted one after the other.
+    """
+
+    def __init__(
+        self, problem: Problem, robot: int, tasks: Iterable[int] = (), *, together: bool = False
+    ) -> None:
+        self.problem, self.together = problem, together
+        self.cost = problem.cost[problem.mode[robot]]
+        self.path = [int(problem.start[robot])]
+        self.stops: list[int] = []
+        self.tasks: set[int] = set()
+        self._price()
+        for task in tasks:
+            self.insert(task)
+
+    def _price(self) -> None:
+        problem = self.problem
+        whole = None
+        if self.together:
+            whole = np.ones(len(self.path), dtype=np.bool_)
+            for place, (a, b) in enumerate(pairwise(self.stops)):
+                whole[place + 1] = a != b
+        self.prices, self._i, self._j = best_places(
+            self.cost, np.array(self.path), problem.pickup, problem.delivery, problem.visit, whole
+        )
+        """(P,) how much longer the path would get by each task [m], inf = impossible."""
+
+    def insert(self, task: int) -> None:
+        """Put a task where it costs least."""
+        problem, i, j = self.problem, int(self._i[task]), int(self._j[task])
+        self.tasks.add(task)
+        if not problem.visit[task]:
+            self.path.insert(j + 1, int(problem.delivery[task]))
+            self.stops.insert(j, task)
+        self.path.insert(i + 1, int(problem.pickup[task]))
+        self.stops.insert(i, task)
+        self._price()
+
+    def picks(self) -> Picks:
+        """Return the stops in order."""
+        picks: list[tuple[int, StopName]] = []
+        seen: set[int] = set()
+        for task in self.stops:
+            name: StopName = "delivery" if task in seen else "pickup"
+            picks.append((task, "visit" if self.problem.visit[task] else name))
+            seen.add(task)
+        return tuple(picks)
