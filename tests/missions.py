@@ -70,7 +70,8 @@ def bush(id: str, polygon: Polygon, *, known: bool = False) -> Obstacle:
 
 def yard(robots: Sequence[Robot], tasks: Sequence[Task], **changes: Any) -> Mission:
     """Return a mission in a walled yard of 10 m x 10 m; `changes` go to its map or to itself."""
-    about = {key: changes.pop(key) for key in ("bounds", "walls", "obstacles") if key in changes}
+    of_map = ("bounds", "walls", "wall_thickness", "obstacles")
+    about = {key: changes.pop(key) for key in of_map if key in changes}
     map = Map(**({"bounds": (0.0, 0.0, SIZE, SIZE), "wall_thickness": 0.2} | about))
     values: dict[str, Any] = {
         "name": "yard",

@@ -74,8 +74,13 @@ void Leg::set_ends(const std::vector<Cost>& ends) {
     ends_ = ends;
     if (fresh_) return;
     grow();
+    renew(target_);
+}
+
+// Look at a node anew after what follows it changed.
+void Leg::renew(int node) {
     for (int q = 0; q < drive_->states; ++q) {
-        const int s = target_ * drive_->states + q;
+        const int s = node * drive_->states + q;
         const Cost least = best(s);
         if (least != rhs(s)) {
             touch(s).rhs = least;
@@ -93,16 +98,7 @@ void Leg::set_start(Vec at, std::vector<Link> links, std::vector<int> states, bo
 void Leg::changed(const std::vector<int>& edges) {
     if (fresh_) return;
     grow();
-    for (int e : edges)
-        for (int v : {graph_->from[e], graph_->to[e]})
-            for (int q = 0; q < drive_->states; ++q) {
-                const int s = v * drive_->states + q;
-                const Cost least = best(s);
-                if (least != rhs(s)) {
-                    touch(s).rhs = least;
-                    update(s);
-                }
-            }
+    for (int e : edges) renew(graph_->from[e]), renew(graph_->to[e]);
 }
 
 void Leg::restart() {

@@ -75,6 +75,7 @@ private:
     Cost enter(int q, const Link& link) const;
     Key key(int s) const;
     Cost bound() const;
+    void renew(int node);
     void restart();
     void grow();
     bool run(long limit);

@@ -13,8 +13,10 @@ Examples
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -112,3 +114,17 @@ def allocate(
     scene = prepare(mission, Params(points=points), seed)
     require_reachable(scene)
     return assign(scene, chosen, Budget(), seed).assignment
+
+
+class _Package(ModuleType):
+    """Keeps `oath.allocate` the function: Python binds the room of that name when it is imported.
+
+    The room's own names are there all the same, ``from oath.allocate import Problem``.
+    """
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if not (name == "allocate" and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package

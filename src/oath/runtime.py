@@ -112,6 +112,8 @@ class Runtime:
                 self._track(item)
                 self._state, actions = advance(self._state, item)
                 work.extendleft(reversed(actions))
+            elif isinstance(item, Allocate) and work:
+                work.append(item)  # a round should know all that has happened
             else:
                 work.extendleft(reversed(self._perform(item)))
 

@@ -138,6 +138,18 @@ def test_a_delivery_on_the_way_makes_room() -> None:
         ask(Broken(lambda a: _with(a, "t0 pickup", "old delivery", "t0 delivery")), problem)
 
 
+def test_what_is_added_to_a_route_is_reached_from_its_end() -> None:
+    """A find may have cut off the route's own stops from there; that is not the allocator's."""
+    problem = line([5.0], [(1, 5), (6, 7)])
+    problem.cost[0, 0, 1] = np.inf  # from where t0 ends to where it begins
+    problem = replace(problem, busy=np.array([True]), routes=(route("t0 pickup", "t0 delivery"),))
+    longer = ("t0 pickup", "t0 delivery", "t1 pickup", "t1 delivery")
+    ask(Broken(lambda a: _with(a, *longer)), problem)
+    problem.cost[0, 0, 2] = np.inf
+    with pytest.raises(ProviderError, match="cannot reach the pickup of task 't1'"):
+        ask(Broken(lambda a: _with(a, *longer)), problem)
+
+
 def test_names_are_looked_up() -> None:
     assert isinstance(allocator("oath"), Oath)
     with pytest.raises(BadInput, match="did you mean 'oath'"):

@@ -165,12 +165,15 @@ class _Check:
         problem, robot = self.problem, self.problem.robots[r]
         cost = problem.cost[problem.mode[r]]
         load, at = int(problem.load[r]), int(problem.start[r])
-        for stop in route:
+        old = problem.routes[r]
+        # The start is where the old route ends: what it led to was reachable from elsewhere.
+        new_from = len(old) if route[: len(old)] == old else 0
+        for i, stop in enumerate(route):
             load += {"pickup": 1, "delivery": -1}.get(stop.stop, 0)
             if load > problem.capacity[r]:
                 self.fail(f"robot '{robot}' carries {load}, its room is {problem.capacity[r]}")
             task = self.index.get(stop.task)
-            if task is None:
+            if task is None or i < new_from:
                 continue
             if problem.capability[r, problem.type[task]] <= 0:
                 self.fail(f"robot '{robot}' cannot do the type of task '{stop.task}'")

@@ -55,9 +55,8 @@ def compile_rules(
         try:
             formulas.append(parse(text, known))
         except BadInput as error:
-            raise BadInput(
-                error.problem, file=file, field=f"rules[{i}]", remedy=error.remedy
-            ) from error
+            remedy = error.remedy.partition("\n")[0]  # an error in a file is one line
+            raise BadInput(error.problem, file=file, field=f"rules[{i}]", remedy=remedy) from error
     whole = conjunction(formulas)
     avoid, rest = invariants(whole)
     automaton = translate(rest)

@@ -388,6 +388,8 @@ def build(
             for robot in mission.robots:
                 if task.type in robot.can:
                     wanted[mode_of[robot.id]].add(world.stops[stop.at])
+    for place in sorted(relevant & mission.places.keys()):
+        roadmap.insert(mission.places[place])  # only an edge that ends there visits it
     roadmap.connect({m: sorted(nodes) for m, nodes in wanted.items()})
     return world
 
