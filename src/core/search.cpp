@@ -364,11 +364,11 @@ private:
         Place best;
         best.cost = limit;
         for (int i = 0; i <= n; ++i) {
+            // What is aboard takes room up to here.
+            if (task.kind == Kind::kAboard && route.load[i] > robot.capacity) break;
             const Length in = first[route.at[i]];
             if (in >= best.cost || (blink > 0 && random_.unit() < blink)) continue;
             if (task.kind != Kind::kDelivery) {
-                // What is aboard takes room up to here.
-                if (task.kind == Kind::kAboard && route.load[i] > robot.capacity) break;
                 const Length c = in + (i < n ? first[route.at[i + 1]] - route.hop[i] : 0);
                 if (c < best.cost) best = {c, r, i, i};
                 continue;
