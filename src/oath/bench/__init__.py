@@ -36,6 +36,7 @@ STUDIES: dict[str, Callable[[], Study]] = {
         "optimality",
         "scaling",
         "automaton",
+        "churn",
     )
 }
 """Every study by its name, in the order of the report."""
