@@ -102,7 +102,7 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class Repair:
-    """Repair a robot's plan if the obstacle touches it; then answer with `Planned`."""
+    """Stop a robot that an obstacle is in the way of, repair its plan; answer with `Planned`."""
 
     robot: str
     obstacle: str
@@ -149,11 +149,9 @@ def advance(state: State, event: AnyEvent) -> tuple[State, tuple[Action, ...]]:
         case StopServed():
             return _stop_served(state, event)
         case ObstacleFound():
-            busy = [id for id, robot in state.robots.items() if robot.route]
-            return state, (
-                UpdateMap(event.obstacle),
-                *(Repair(robot, event.obstacle) for robot in busy),
-            )
+            # Even a robot without a route may still be on its last move.
+            repairs = (Repair(robot, event.obstacle) for robot in state.robots)
+            return state, (UpdateMap(event.obstacle), *repairs)
         case MissionFinished():
             return replace(state, finished=True), ()
         case _:
