@@ -18,7 +18,8 @@ rm -f "$package"/oath/_core*.so
 cp "$build"/_core*.so "$package/oath/"
 
 cxx=$(sed -n 's/^CMAKE_CXX_COMPILER:[A-Z]*=//p' "$build/CMakeCache.txt")
-export PYTHONPATH="$package"
+# Without .pth files (-S below): an editable installation would slip its own core in.
+export PYTHONPATH="$package:$(python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')"
 export PYTHONMALLOC=malloc # so that overruns of Python's own buffers are seen
 # To a file, for pytest swallows what a dying process writes.
 export ASAN_OPTIONS="detect_leaks=0:halt_on_error=1:log_path=$package/report"
@@ -26,14 +27,13 @@ export UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1:log_path=$package/repor
 preload="$("$cxx" -print-file-name=libasan.so):$("$cxx" -print-file-name=libubsan.so)"
 
 status=0
-LD_PRELOAD="$preload" python - "$package" <<'PYTHON' || status=$?
+LD_PRELOAD="$preload" python -S - "$package" <<'PYTHON' || status=$?
 import sys
 
 import pytest
 
 import oath._core
 
-# An editable installation must not slip its own core in.
 assert oath._core.__file__.startswith(sys.argv[1]), oath._core.__file__
 
 

@@ -279,7 +279,11 @@ def test_the_mission_does_not_end_while_somebody_drives_or_a_round_is_on() -> No
 def test_a_find_goes_on_the_map_before_anybody_repairs() -> None:
     ready = state(robots={"r1": RobotState(position=(1, 1), route=route("c")), "r2": idle()})
     event = ev.ObstacleFound(t=1.0, robot="r2", obstacle="bush-1", polygon=DOOR)
-    assert pure(ready, event)[1] == (UpdateMap("bush-1"), Repair("r1", "bush-1"))
+    assert pure(ready, event)[1] == (
+        UpdateMap("bush-1"),
+        Repair("r1", "bush-1"),
+        Repair("r2", "bush-1"),
+    )
 
 
 @pytest.mark.parametrize(

@@ -351,6 +351,27 @@ def test_a_find_of_one_robot_turns_another() -> None:
     assert not of(Moved, result, "cart")
 
 
+def test_a_robot_that_was_given_more_on_its_way_still_minds_the_way() -> None:
+    """Its new plan begins where its move ends, but what blocks that move stops it all the same."""
+    mission = yard(
+        [robot("cart", (1, 2)), robot("drone", (1, 9), motion="drone", can={"inspect": 1.0})],
+        [
+            visit("urgent", (3.5, 2), type="inspect", priority="high"),
+            visit("far", (9, 9), type="inspect"),
+        ],
+        obstacles=(
+            bush("bush-1", box(3, 1.5, 4, 2.5)),  # turns the urgent task over to the drone
+            gate("gate-1", box(5, 8, 5.5, 9.8)),  # in the middle of the drone's first move
+        ),
+    )
+    result = all_done(mission, points=5)
+    assert [(stop.robot, stop.task) for stop in of(StopServed, result)] == [
+        ("drone", "far"),
+        ("drone", "urgent"),
+    ]
+    assert result.summary["replans"] >= 2
+
+
 @pytest.mark.parametrize(("factor", "through"), [(1.5, True), (5.0, False)])
 def test_a_costly_obstacle_is_crossed_only_if_the_way_round_costs_more(
     factor: float, through: bool

@@ -107,7 +107,7 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class Repair:
-    """Repair a robot's plan if the obstacle touches it; then answer with `Planned`."""
+    """Stop a robot that an obstacle is in the way of, repair its plan; answer with `Planned`."""
 
     robot: str
     obstacle: str
@@ -154,12 +154,10 @@ def advance(state: State, event: AnyEvent) -> tuple[State, tuple[Action, ...]]:
         case StopServed():
             return _stop_served(state, event)
         case ObstacleFound():
-            busy = [id for id, robot in state.robots.items() if robot.route]
-            actions: tuple[Action, ...] = (
-                UpdateMap(event.obstacle),
-                *(Repair(robot, event.obstacle) for robot in busy),
-            )
-            if state.reconsiders and busy:
+            # Even a robot without a route may still be on its last move.
+            repairs = (Repair(robot, event.obstacle) for robot in state.robots)
+            actions: tuple[Action, ...] = (UpdateMap(event.obstacle), *repairs)
+            if state.reconsiders and any(robot.route for robot in state.robots.values()):
                 state, more = _allocate(state)
                 actions += more
             return state, actions

@@ -65,6 +65,7 @@ class Planner:
         self._leg = 0
         self._pending: list[NDArray[np.int32]] = []
         self._plan = Plan(length=0.0, legs=())
+        self._joins: Point | None = None  # where the move under way ends and the plan begins
 
     def begin(self, at: Point, services: Sequence[Service]) -> Plan:
         """Plan a new route from a point [m]; a robot on the move names where the move ends."""
@@ -73,6 +74,7 @@ class Planner:
 
     def replan(self, at: Point) -> Plan:
         """Repair the plan of what remains of the route, from a point [m]."""
+        self._joins = at if at != self.position else None
         core = self._searcher()
         states = self._after_driving_to(at)
         flags = [int(q in states) for q in range(self.rules.automaton.states)]
@@ -101,7 +103,7 @@ class Planner:
             self._pending.append(edges)
 
     def touches(self, obstacle: Obstacle) -> bool:
-        """Whether what remains of the plan comes too near to an obstacle that blocks the robot."""
+        """Whether the way to the plan or what remains of it comes too near to what blocks."""
         mode = self.roadmap.modes[self.mode]
         if mode.motion.blocked_by(obstacle.kind):
             polygon, reach = ShapelyPolygon(obstacle.polygon), mode.radius
@@ -109,7 +111,10 @@ class Planner:
             polygon, reach = ShapelyPolygon(obstacle.polygon), 0.0
         else:
             return False
-        lines = [LineString(leg) for leg in self._plan.legs if len(leg) > 1]
+        ways: list[Array | list[Point]] = [leg for leg in self._plan.legs if len(leg) > 1]
+        if self._joins is not None:
+            ways.append([self.position, self._joins])
+        lines = [LineString(way) for way in ways]
         return any(line.distance(polygon) <= reach for line in lines)
 
     def leg(self) -> list[Point]:
@@ -138,6 +143,8 @@ class Planner:
         """The robot drove straight from where it was to a point [m]."""
         self._states = self._after_driving_to(to)
         self.position = to
+        if to == self._joins:
+            self._joins = None
 
     def served(self) -> None:
         """The robot served the current leg's stop."""

@@ -53,6 +53,7 @@ class Sheet:
     """Points [m] that a label should rather not cover: walls and routes."""
 
     def legend(self, rank: int, text: str, handle: Any) -> None:
+        """Put an entry into the legend, once for each text; lower ranks stand first."""
         # Labels that start with an underscore would be left out.
         text = _short(f" {text}" if text.startswith("_") else text, 40)
         self.handles.setdefault(text, (rank, handle))
