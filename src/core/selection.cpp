@@ -5,9 +5,15 @@
 // and a group and a next stop determine the new group and the new last stop: each value is computed
 // once, as a minimum over the lasts of one group, and only groups are looked up.
 //
-// Two passes: a narrow one, which keeps the most promising groups of each layer, gives an upper
-// bound; the wide one drops every state whose value plus a lower bound of the rest reaches it. When
-// the wide pass runs out of its work limit it goes on narrow, and says that it is not exact.
+// A narrow pass, which keeps the most promising groups of each layer, gives an upper bound; the wide
+// one drops every state whose value plus a lower bound of the rest reaches it. When the wide pass
+// runs out of its work limit it goes on narrow, and says that it is not exact.
+//
+// Lower bounds come from a relaxed state space (Christofides, Mingozzi, Toth, "State-space relaxation
+// procedures for the computation of bounds to routing problems", 1981): of the sets, only how many
+// stops are still to be made is kept, so a route may make one stop twice. Every stop has a price that
+// the route gets back when it makes it, and that the bound charges once for each stop that is due;
+// subgradient steps set the prices such that relaxed routes make each stop about once.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
@@ -29,10 +35,17 @@ namespace {
 constexpr int kMaxTasks = 32;
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr std::size_t kNarrow = 128;  // groups a layer of the first pass
-constexpr std::size_t kBeam = 3072;   // groups a layer once the work limit is reached
+constexpr int kRounds = 50;           // of improving a route, per task taken
+constexpr int kPricing = 40;          // subgradient steps
+constexpr std::size_t kBeam = 768;    // groups a layer once the work limit is reached
 constexpr std::int64_t kLookup = 32;  // a look-up's work, in additions
 
-int count(std::uint64_t bits) { return __builtin_popcountll(bits); }
+// By hand: without a flag for newer processors, compilers call a library function.
+int count(std::uint32_t bits) {
+    bits -= bits >> 1 & 0x55555555u;
+    bits = (bits & 0x33333333u) + (bits >> 2 & 0x33333333u);
+    return static_cast<int>(((bits + (bits >> 4)) & 0x0F0F0F0Fu) * 0x01010101u >> 24);
+}
 int lowest(std::uint32_t bits) { return __builtin_ctz(bits); }
 
 // The instance on its own dense locations: stop s < n is task s's first, s >= n task s - n's last.
@@ -41,15 +54,21 @@ struct Instance {
     std::uint32_t visits = 0;
     std::vector<double> from_start;  // (n,) to each first stop
     std::vector<double> leg;         // (2n, 2n), row = to, column = from: a row serves one minimum
-    std::vector<double> into_first;  // (n,) cheapest leg into a first stop, except from the start
-    std::vector<double> into_last;   // (n,) cheapest leg into a last stop; 0 for a visit
-    std::vector<int> by_cost;        // (n,) tasks by the sum of both
+    std::vector<double> price;       // (2n,) of each stop; 0 for the last stop of a visit
+    std::vector<int> by_price;       // (n,) tasks by the sum of both
 
     int stops() const { return 2 * n; }
     double to(int stop, int from) const {
         return leg[static_cast<std::size_t>(stop) * stops() + from];
     }
-    double task_bound(int task) const { return into_first[task] + into_last[task]; }
+    double task_price(int task) const { return price[task] + price[n + task]; }
+    bool visit(int task) const { return visits >> task & 1u; }
+
+    void sort_by_price() {
+        std::iota(by_price.begin(), by_price.end(), 0);
+        std::stable_sort(by_price.begin(), by_price.end(),
+                         [&](int a, int b) { return task_price(a) < task_price(b); });
+    }
 };
 
 // Cheapest leg into `stop` that a route may use; 0 if there is none, which bounds nothing.
@@ -85,15 +104,129 @@ Instance make_instance(const double* cost, std::size_t locations, std::int64_t s
     in.leg.resize(static_cast<std::size_t>(4) * n * n);
     for (int to = 0; to < 2 * n; ++to)
         for (int from = 0; from < 2 * n; ++from) in.leg[to * 2 * n + from] = read(at[from], at[to]);
-    in.into_first.resize(n), in.into_last.resize(n), in.by_cost.resize(n);
+    // With these prices no leg gets back more than it costs, so they bound without a relaxed route.
+    in.price.resize(2 * n), in.by_price.resize(n);
     for (int i = 0; i < n; ++i) {
-        in.into_first[i] = cheapest_into(in, i);
-        in.into_last[i] = visit[i] ? 0.0 : cheapest_into(in, n + i);
+        in.price[i] = cheapest_into(in, i);
+        in.price[n + i] = visit[i] ? 0.0 : cheapest_into(in, n + i);
     }
-    std::iota(in.by_cost.begin(), in.by_cost.end(), 0);
-    std::stable_sort(in.by_cost.begin(), in.by_cost.end(),
-                     [&](int a, int b) { return in.task_bound(a) < in.task_bound(b); });
+    in.sort_by_price();
     return in;
+}
+
+// Least costs, less prices, of relaxed routes: from a stop on, with this many first and last stops
+// still to be made. No relaxed route goes from a stop back to the one before, or to its task's first.
+class Relaxed {
+public:
+    explicit Relaxed(const Instance& in) : in_(in), side_(in.take + 1), cell_(side_ * side_) {
+        for (auto& cell : cell_) cell.resize(in.stops());
+    }
+
+    double to_go(int firsts, int lasts, int stop) const {
+        return at(firsts, lasts)[stop].least;
+    }
+
+    // Everything anew, after the prices changed.
+    void fill() {
+        for (Entry& entry : at(0, 0)) entry = {0.0, kInf, -1};
+        for (int lasts = 1; lasts <= in_.take; ++lasts)
+            for (int firsts = 0; firsts <= lasts; ++firsts)
+                if (lasts - firsts <= in_.capacity) fill(firsts, lasts);
+    }
+
+    // The bound of a whole route, and how often its relaxed route makes each stop, less how often it
+    // is charged.
+    double whole(std::vector<int>& surplus) const {
+        surplus.assign(in_.stops(), 0);
+        double bound = 0.0, least = kInf;
+        for (int i = 0; i < in_.take; ++i) {
+            const int task = in_.by_price[i];
+            bound += in_.task_price(task);
+            --surplus[task];
+            if (!in_.visit(task)) --surplus[in_.n + task];
+        }
+        int stop = -1, firsts = in_.take, lasts = in_.take, before = -1;
+        for (int task = 0; task < in_.n; ++task) {
+            if (!in_.visit(task) && in_.capacity < 1) continue;
+            const auto& rest = at(firsts - 1, in_.visit(task) ? lasts - 1 : lasts)[task];
+            const double value = in_.from_start[task] - in_.price[task] + rest.least;
+            if (value < least) least = value, stop = task;
+        }
+        while (stop >= 0) {
+            ++surplus[stop];
+            if (stop < in_.n) --firsts;
+            if (stop >= in_.n || in_.visit(stop)) --lasts;
+            const Entry& entry = at(firsts, lasts)[stop];
+            const int next = entry.next == before ? entry.other : entry.next;
+            before = stop, stop = next;
+        }
+        return bound + least;
+    }
+
+private:
+    struct Entry {
+        double least = kInf, second = kInf;  // the second goes on with another stop
+        int next = -1, other = -1;
+    };
+    std::vector<Entry>& at(int firsts, int lasts) { return cell_[firsts * side_ + lasts]; }
+    const std::vector<Entry>& at(int firsts, int lasts) const {
+        return cell_[firsts * side_ + lasts];
+    }
+
+    void fill(int firsts, int lasts) {
+        const int n = in_.n;
+        std::vector<Entry>& here = at(firsts, lasts);
+        std::fill(here.begin(), here.end(), Entry{});
+        for (int to = 0; to < 2 * n; ++to) {
+            const int task = to % n;
+            const bool visit = in_.visit(task);
+            if (to < n ? firsts == 0 || (!visit && lasts - firsts >= in_.capacity)
+                       : visit || lasts == firsts)
+                continue;
+            const Entry& then =
+                at(to < n ? firsts - 1 : firsts, to < n && !visit ? lasts : lasts - 1)[to];
+            const double* leg = &in_.leg[static_cast<std::size_t>(to) * 2 * n];
+            const double least = then.least - in_.price[to], second = then.second - in_.price[to];
+            for (int from = 0; from < 2 * n; ++from) {
+                const double value = leg[from] + (then.next == from ? second : least);
+                if (!(value < here[from].second) || from == to || (to < n && from == n + to))
+                    continue;
+                Entry& entry = here[from];
+                if (value < entry.least)
+                    entry = {value, entry.least, to, entry.next};
+                else
+                    entry.second = value, entry.other = to;
+            }
+        }
+    }
+
+    const Instance& in_;
+    int side_;
+    std::vector<std::vector<Entry>> cell_;
+};
+
+// Raise the bound of the whole route by steps along its subgradient; Polyak's step length.
+void set_prices(Instance& in, Relaxed& relaxed, double upper) {
+    std::vector<double> best = in.price;
+    std::vector<int> surplus;
+    double highest = -kInf, stride = 1.0;
+    for (int step = 0, idle = 0; step < kPricing; ++step) {
+        relaxed.fill();
+        const double bound = relaxed.whole(surplus);
+        if (bound > highest)
+            highest = bound, best = in.price, idle = 0;
+        else if (++idle == 4)
+            stride /= 2, idle = 0;
+        double norm = 0.0;
+        for (const int s : surplus) norm += s * s;
+        if (norm == 0.0 || !(bound < upper) || upper == kInf) break;
+        for (int stop = 0; stop < in.stops(); ++stop)
+            in.price[stop] -= stride * (upper - bound) / norm * surplus[stop];
+        in.sort_by_price();
+    }
+    in.price = best;
+    in.sort_by_price();
+    relaxed.fill();
 }
 
 // A layer's groups. `value` holds, per group, one value per picked task in the order of the task
@@ -148,6 +281,110 @@ struct Result {
     bool exact = true;
 };
 
+// Ruin and recreate (Schrimpf et al., "Record breaking optimization results using the ruin and
+// recreate principle", 2000): take a few tasks off the best route, put the cheapest ones back in.
+class Improve {
+public:
+    Improve(const Instance& in, Result& best) : in_(in), best_(best) {}
+
+    void run(int rounds) {
+        std::vector<int> order = best_.order;
+        for (int round = 0; round < rounds; ++round) {
+            std::vector<int> next = order;
+            for (int k = 1 + draw(std::min(5, in_.take)); k > 0; --k) take_off(next);
+            while (next.size() < order.size() || missing(next) > 0)
+                if (!put_in(next)) break;
+            if (missing(next) > 0) continue;
+            const double now = length_of(next);
+            // Slightly worse routes lead out of dead ends.
+            const double worse = 0.04 * (1.0 - static_cast<double>(round) / rounds);
+            if (now < best_.length * (1.0 + worse)) order = next;
+            if (now < best_.length) best_.order = next, best_.length = now;
+        }
+    }
+
+private:
+    int draw(int below) {
+        state_ = state_ * 6364136223846793005ull + 1442695040888963407ull;
+        return static_cast<int>((state_ >> 33) % static_cast<std::uint64_t>(below));
+    }
+    int missing(const std::vector<int>& order) const {
+        int firsts = 0;
+        for (const int stop : order) firsts += stop < in_.n;
+        return in_.take - firsts;
+    }
+    double leg(int from, int to) const { return from < 0 ? in_.from_start[to] : in_.to(to, from); }
+    double length_of(const std::vector<int>& order) const {
+        double length = 0.0;
+        int at = -1;
+        for (const int stop : order) length += leg(at, stop), at = stop;
+        return length;
+    }
+    void take_off(std::vector<int>& order) {
+        if (order.empty()) return;
+        const int task = order[draw(static_cast<int>(order.size()))] % in_.n;
+        order.erase(std::remove_if(order.begin(), order.end(),
+                                   [&](int stop) { return stop % in_.n == task; }),
+                    order.end());
+    }
+
+    struct Place {
+        double extra = kInf;
+        int task = 0, first = 0, last = 0;  // stops before the new ones in the old order
+    };
+
+    bool put_in(std::vector<int>& order) {
+        std::uint32_t on = 0;
+        for (const int stop : order) on |= 1u << stop % in_.n;
+        Place best;
+        for (int task = 0; task < in_.n; ++task)
+            if (!(on >> task & 1u)) try_places(order, task, best);
+        if (best.extra == kInf) return false;
+        if (!in_.visit(best.task)) order.insert(order.begin() + best.last, in_.n + best.task);
+        order.insert(order.begin() + best.first, best.task);
+        return true;
+    }
+
+    // What it costs to make `stop` between two others; `after` < 0: at the end.
+    double detour(int before, int stop, int after) const {
+        if (after < 0) return leg(before, stop);
+        return leg(before, stop) + leg(stop, after) - leg(before, after);
+    }
+
+    void try_places(const std::vector<int>& order, int task, Place& best) {
+        const int size = static_cast<int>(order.size()), last = in_.n + task;
+        const auto at = [&](int i) { return i < 0 || i >= size ? -1 : order[i]; };
+        // A little noise, so that ties and near ties fall either way.
+        const double noise = 1.0 + 0.001 * draw(100);
+        int load = 0;
+        for (int i = 0; i <= size; ++i) {
+            const double into = detour(at(i - 1), task, at(i));
+            const auto offer = [&](double extra, int j) {
+                if (extra * noise < best.extra) best = {extra * noise, task, i, j};
+            };
+            if (in_.visit(task)) {
+                offer(into, i);
+            } else {
+                const double both = leg(at(i - 1), task) + leg(task, last);
+                if (load < in_.capacity)
+                    offer(i == size ? both : both + leg(last, at(i)) - leg(at(i - 1), at(i)), i);
+                int carried = load;
+                for (int j = i + 1; j <= size && carried < in_.capacity; ++j) {
+                    carried += change(order[j - 1]);
+                    if (carried >= in_.capacity && change(order[j - 1]) > 0) break;
+                    offer(into + detour(order[j - 1], last, at(j)), j);
+                }
+            }
+            if (i < size) load += change(order[i]);
+        }
+    }
+    int change(int stop) const { return in_.visit(stop % in_.n) ? 0 : stop < in_.n ? 1 : -1; }
+
+    const Instance& in_;
+    Result& best_;
+    std::uint64_t state_ = 1;
+};
+
 struct Open {  // an entry of the group in hand
     int stop;
     double value;
@@ -155,8 +392,10 @@ struct Open {  // an entry of the group in hand
 
 class Search {
 public:
-    Search(const Instance& in, double upper, std::size_t width, std::int64_t work)
-        : in_(in), upper_(upper), width_(width), work_(work) {}
+    // Without `relaxed`, prices alone bound; the first prices of an instance do so.
+    Search(const Instance& in, const Relaxed* relaxed, double upper, std::size_t width,
+           std::int64_t work)
+        : in_(in), relaxed_(relaxed), upper_(upper), width_(width), work_(work) {}
 
     Result run() {
         begin();
@@ -171,7 +410,7 @@ public:
     }
 
 private:
-    // Value of the rest of a group, from below: every stop is entered once, by its cheapest leg.
+    // What the stops that a group still has to make are charged for, from below.
     struct Rest {
         double due = 0.0;      // last stops of what is carried
         double more = 0.0;     // the cheapest tasks that still fit the count
@@ -181,17 +420,22 @@ private:
     Rest rest(std::uint32_t picked, std::uint32_t delivered) const {
         Rest rest;
         for (std::uint32_t bits = picked & ~delivered; bits; bits &= bits - 1)
-            rest.due += in_.into_last[lowest(bits)];
+            rest.due += in_.price[in_.n + lowest(bits)];
         int missing = in_.take - count(picked);
         for (std::size_t i = 0; missing > 0; ++i) {
-            const int task = in_.by_cost[i];
+            const int task = in_.by_price[i];
             if (picked >> task & 1u) continue;
-            rest.dearest = in_.task_bound(task);
+            rest.dearest = in_.task_price(task);
             rest.more += rest.dearest;
             rest.cheap |= 1u << task;
             --missing;
         }
         return rest;
+    }
+
+    double to_go(std::uint32_t picked, std::uint32_t delivered, int stop) const {
+        if (relaxed_ == nullptr) return 0.0;
+        return relaxed_->to_go(in_.take - count(picked), in_.take - count(delivered), stop);
     }
 
     void begin() {
@@ -201,17 +445,17 @@ private:
             const bool visit = in_.visits >> task & 1u;
             if (!visit && in_.capacity < 1) continue;
             const bool cheap = before.cheap >> task & 1u;
-            const double more = before.more - (cheap ? in_.task_bound(task) : before.dearest);
-            const double due = visit ? 0.0 : in_.into_last[task];
+            const double more = before.more - (cheap ? in_.task_price(task) : before.dearest);
+            const double due = visit ? 0.0 : in_.price[in_.n + task];
             const std::uint32_t bit = 1u << task;
-            put(layers_[0], bit, visit ? bit : 0u, task, in_.from_start[task], due + more, 0);
+            put(layers_[0], bit, visit ? bit : 0u, task, task, in_.from_start[task], due + more, 0);
         }
     }
 
     // Enter a state unless it cannot beat the upper bound.
-    void put(Layer& layer, std::uint32_t picked, std::uint32_t delivered, int task, double value,
-             double rest_bound, int origin) {
-        if (!(value + rest_bound < upper_)) return;
+    void put(Layer& layer, std::uint32_t picked, std::uint32_t delivered, int task, int stop,
+             double value, double rest_bound, int origin) {
+        if (!(value + rest_bound + to_go(picked, delivered, stop) < upper_)) return;
         spent_ += kLookup;
         const std::uint64_t key = picked | static_cast<std::uint64_t>(delivered) << 32;
         if (picked == delivered && count(picked) == in_.take) {
@@ -248,7 +492,7 @@ private:
         const Rest left = rest(picked, delivered);
         for (std::uint32_t bits = carried; bits; bits &= bits - 1) {
             const int task = lowest(bits);
-            const double bound = left.due - in_.into_last[task] + left.more;
+            const double bound = left.due - in_.price[in_.n + task] + left.more;
             step(open, size, picked, delivered | 1u << task, task, in_.n + task, bound);
         }
         if (count(picked) == in_.take) return;
@@ -258,8 +502,8 @@ private:
             const bool visit = in_.visits & bit;
             if ((picked & bit) || (full && !visit)) continue;
             const double more =
-                left.more - (left.cheap & bit ? in_.task_bound(task) : left.dearest);
-            const double bound = left.due + in_.into_last[task] + more;
+                left.more - (left.cheap & bit ? in_.task_price(task) : left.dearest);
+            const double bound = left.due + in_.price[in_.n + task] + more;
             step(open, size, picked | bit, visit ? delivered | bit : delivered, task, task, bound);
         }
     }
@@ -274,7 +518,7 @@ private:
             const double value = open[i].value + leg[open[i].stop];
             if (value < least) least = value, origin = open[i].stop;
         }
-        put(layers_.back(), picked, delivered, task, least, bound, origin);
+        put(layers_.back(), picked, delivered, task, stop, least, bound, origin);
     }
 
     // Narrow the layer if it is wider than the pass allows, or than the work that is left.
@@ -283,7 +527,7 @@ private:
         for (const std::uint64_t key : layer.keys) {
             const auto picked = static_cast<std::uint32_t>(key);
             const int more = count(picked) < in_.take ? in_.n - count(picked) : 0;
-            const int next = more + count(picked) - count(key >> 32);
+            const int next = more + count(picked) - count(static_cast<std::uint32_t>(key >> 32));
             ahead += static_cast<std::int64_t>(next) * (count(picked) + kLookup);
         }
         if (spent_ + ahead > work_) width_ = std::min(width_, kBeam);
@@ -297,9 +541,7 @@ private:
             const std::uint64_t key = layer.keys[g];
             const Rest left = rest(static_cast<std::uint32_t>(key),
                                    static_cast<std::uint32_t>(key >> 32));
-            const double* value = &layer.value[g * take];
-            rank[g] = {*std::min_element(value, value + take) + left.due + left.more,
-                       static_cast<std::uint32_t>(g)};
+            rank[g] = {promise(layer, g) + left.due + left.more, static_cast<std::uint32_t>(g)};
         }
         std::nth_element(rank.begin(), rank.begin() + width_, rank.end());
         rank.resize(width_);
@@ -313,6 +555,21 @@ private:
             kept.origin.insert(kept.origin.end(), &layer.origin[at], &layer.origin[at] + take);
         }
         layer = std::move(kept);
+    }
+
+    // The least of a group's values, each with its relaxed rest.
+    double promise(const Layer& layer, std::size_t g) const {
+        const auto picked = static_cast<std::uint32_t>(layer.keys[g]);
+        const auto delivered = static_cast<std::uint32_t>(layer.keys[g] >> 32);
+        double least = kInf;
+        std::size_t at = g * in_.take;
+        for (std::uint32_t bits = picked; bits; bits &= bits - 1, ++at) {
+            const int task = lowest(bits);
+            const bool at_last = (delivered & ~in_.visits) >> task & 1u;
+            const double rest = to_go(picked, delivered, at_last ? in_.n + task : task);
+            least = std::min(least, layer.value[at] + rest);
+        }
+        return least;
     }
 
     // Walk back from the best complete state.
@@ -352,6 +609,7 @@ private:
     };
 
     const Instance& in_;
+    const Relaxed* relaxed_;
     double upper_;
     std::size_t width_;
     std::int64_t work_, spent_ = 0;
@@ -361,13 +619,18 @@ private:
     Index index_;
 };
 
-Result select(const Instance& in, std::int64_t work) {
-    Result first = Search(in, kInf, kNarrow, work).run();
-    if (first.exact) return first;
-    Result wide = Search(in, first.length, std::numeric_limits<std::size_t>::max(), work).run();
-    if (wide.length < first.length) return wide;
-    first.exact = wide.exact;  // nothing shorter exists if every state below the bound was seen
-    return first;
+Result select(Instance in, std::int64_t work) {
+    Result best = Search(in, nullptr, kInf, kNarrow, work).run();
+    if (best.exact) return best;
+    if (best.length < kInf) Improve(in, best).run(kRounds * in.take);
+    Relaxed relaxed(in);
+    set_prices(in, relaxed, best.length);
+    constexpr std::size_t all = std::numeric_limits<std::size_t>::max();
+    Result wide = Search(in, &relaxed, best.length, all, work).run();
+    best.exact = wide.exact;  // nothing shorter exists if every state below the bound was seen
+    if (wide.length < best.length) best = std::move(wide);
+    if (!best.exact && best.length < kInf) Improve(in, best).run(kRounds * in.take);
+    return best;
 }
 
 using Costs = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
@@ -425,12 +688,12 @@ nb::tuple select_tasks(const Costs& cost, std::int64_t start, const Indices& fir
 void bind_selection(nb::module_& m) {
     m.def("select_tasks", &select_tasks, nb::arg("cost"), nb::arg("start"), nb::arg("first"),
           nb::arg("last"), nb::arg("visit"), nb::arg("take"), nb::arg("capacity"),
-          nb::arg("work") = 200'000'000,
+          nb::arg("work") = 7'000'000,
           nb::sig("def select_tasks(cost: numpy.typing.NDArray[numpy.float64], start: int, "
                   "first: numpy.typing.NDArray[numpy.int32], "
                   "last: numpy.typing.NDArray[numpy.int32], "
                   "visit: numpy.typing.NDArray[numpy.bool_], take: int, capacity: int, "
-                  "work: int = 200000000) "
+                  "work: int = 7000000) "
                   "-> tuple[numpy.typing.NDArray[numpy.int32], float, bool]"),
           R"(Choose tasks and the shortest open pickup-and-delivery order, by dynamic programming.
 

@@ -28,6 +28,9 @@ Picks = tuple[tuple[int, StopName], ...]
 CORE_LIMIT = 32
 """Tasks that the compiled search takes, and so the most that a robot is given at once."""
 
+QUICK_WORK, LONG_WORK, MANY = 7_000_000, 40_000_000, 12
+"""Additions of the exact search: the first up to MANY tasks, where missions wait for the answer."""
+
 FEW, CANDIDATES = 5, 24
 """Up to FEW tasks are chosen among CORE_LIMIT candidates, more of them among CANDIDATES."""
 
@@ -49,9 +52,10 @@ def select(
         Indices of tasks; those that the robot cannot do are passed over.
     method
         ``dp``: dynamic programming, exact wherever its bounds keep it within its work limit: on all
-        random instances tried with 12 tasks of 12, 7 of 16, 5 of 24 or 4 of 32. Beyond, a beam
-        search takes over where the limit is met. Among more candidates than `CORE_LIMIT` or
-        `CANDIDATES` the nearest are kept first (see `nearest`), so even 18 tasks stay below 0.7 s.
+        random instances tried with 9 tasks of 9, 5 of 24 or 4 of 32. Where the limit is met, a beam
+        search and ruin and recreate take over, so that 12 tasks take about 30 ms and 18 stay far
+        below 0.7 s. Among more candidates than `CORE_LIMIT` or `CANDIDATES` the nearest are kept
+        first (see `nearest`).
         ``milp``: the paper's program, solved by HiGHS; exact, for few tasks.
 
     Returns
@@ -115,6 +119,7 @@ def _dynamic(problem: Problem, robot: int, tasks: NDArray[np.intp], take: int) -
         problem.visit[tasks],
         take,
         int(problem.capacity[robot]),
+        QUICK_WORK if take <= MANY else LONG_WORK,
     )
     stops: list[int] = order.tolist()
     return stops
