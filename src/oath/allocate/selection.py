@@ -70,7 +70,10 @@ def select(
         limit = CORE_LIMIT if take <= FEW else max(take, CANDIDATES)
         tasks = nearest(problem, robot, tasks, limit)
     for count in range(take, 0, -1):
-        stops = (_dynamic if method == "dp" else _milp)(problem, robot, tasks, count)
+        if method == "dp":
+            stops, _, _ = dynamic(problem, robot, tasks, count)
+        else:
+            stops = program(problem, robot, tasks, count)
         if stops:
             return _picks(problem, tasks, stops)
     return ()
@@ -110,8 +113,28 @@ def _picks(problem: Problem, tasks: NDArray[np.intp], stops: Sequence[int]) -> P
     return tuple(picks)
 
 
-def _dynamic(problem: Problem, robot: int, tasks: NDArray[np.intp], take: int) -> list[int]:
-    order, _, _ = _core.select_tasks(
+def dynamic(
+    problem: Problem, robot: int, tasks: NDArray[np.intp], take: int, *, work: int | None = None
+) -> tuple[list[int], float, bool]:
+    """Choose and order that many of the tasks by dynamic programming.
+
+    Parameters
+    ----------
+    work
+        Additions that the exact search may spend; None = `QUICK_WORK` or `LONG_WORK`.
+
+    Returns
+    -------
+    stops
+        i = first stop of the i-th of the tasks, n + i = its last; [] if there is no such path.
+    length
+        Of the path [m].
+    exact
+        Whether it is proven to be the shortest.
+    """
+    if work is None:
+        work = QUICK_WORK if take <= MANY else LONG_WORK
+    order, length, exact = _core.select_tasks(
         problem.cost[problem.mode[robot]],
         int(problem.start[robot]),
         problem.pickup[tasks],
@@ -119,14 +142,31 @@ def _dynamic(problem: Problem, robot: int, tasks: NDArray[np.intp], take: int) -
         problem.visit[tasks],
         take,
         int(problem.capacity[robot]),
-        QUICK_WORK if take <= MANY else LONG_WORK,
+        work,
     )
-    stops: list[int] = order.tolist()
-    return stops
+    return order.tolist(), length, exact
 
 
-def _milp(problem: Problem, robot: int, tasks: NDArray[np.intp], take: int) -> list[int]:
-    """Solve the selection as a mixed-integer linear program; [] if it has no solution."""
+def program(
+    problem: Problem,
+    robot: int,
+    tasks: NDArray[np.intp],
+    take: int,
+    *,
+    seconds: float = float("inf"),
+) -> list[int]:
+    """Choose and order that many of the tasks by a mixed-integer linear program.
+
+    Parameters
+    ----------
+    seconds
+        Wall clock after which it gives up [s].
+
+    Returns
+    -------
+    list[int]
+        Stops as `dynamic` numbers them; [] if there is no such path, or none proven in time.
+    """
     from scipy.optimize import Bounds, LinearConstraint, milp  # a third of a second to import
 
     program = _Program(problem, robot, tasks, take)
@@ -135,7 +175,7 @@ def _milp(problem: Problem, robot: int, tasks: NDArray[np.intp], take: int) -> l
         integrality=program.whole,
         bounds=Bounds(0, program.upper),
         constraints=LinearConstraint(program.matrix(), program.least, program.most),
-        options={"mip_rel_gap": 0.0},
+        options={"mip_rel_gap": 0.0, "time_limit": seconds},
     )
     return program.stops(answer.x) if answer.success else []
 
