@@ -35,7 +35,7 @@ namespace {
 constexpr int kMaxTasks = 32;
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr std::size_t kNarrow = 128;  // groups a layer of the first pass
-constexpr int kRounds = 50;           // of improving a route, per task taken
+constexpr int kRounds = 40;           // of improving a route, per task taken
 constexpr int kPricing = 40;          // subgradient steps
 constexpr std::size_t kBeam = 768;    // groups a layer once the work limit is reached
 constexpr std::int64_t kLookup = 32;  // a look-up's work, in additions
@@ -291,13 +291,13 @@ public:
         std::vector<int> order = best_.order;
         for (int round = 0; round < rounds; ++round) {
             std::vector<int> next = order;
-            for (int k = 1 + draw(std::min(5, in_.take)); k > 0; --k) take_off(next);
+            take_off(next, 1 + draw(std::min(5, in_.take)));
             while (next.size() < order.size() || missing(next) > 0)
                 if (!put_in(next)) break;
             if (missing(next) > 0) continue;
             const double now = length_of(next);
             // Slightly worse routes lead out of dead ends.
-            const double worse = 0.04 * (1.0 - static_cast<double>(round) / rounds);
+            const double worse = 0.08 * (1.0 - static_cast<double>(round) / rounds);
             if (now < best_.length * (1.0 + worse)) order = next;
             if (now < best_.length) best_.order = next, best_.length = now;
         }
@@ -320,11 +320,15 @@ private:
         for (const int stop : order) length += leg(at, stop), at = stop;
         return length;
     }
-    void take_off(std::vector<int>& order) {
-        if (order.empty()) return;
-        const int task = order[draw(static_cast<int>(order.size()))] % in_.n;
+    // Take tasks off: any, or those of stops that follow one another.
+    void take_off(std::vector<int>& order, int tasks) {
+        const int size = static_cast<int>(order.size()), from = draw(size);
+        const bool together = draw(2) == 0;
+        std::uint32_t off = 0;
+        for (int i = 0; i < tasks; ++i)
+            off |= 1u << order[together ? (from + i) % size : draw(size)] % in_.n;
         order.erase(std::remove_if(order.begin(), order.end(),
-                                   [&](int stop) { return stop % in_.n == task; }),
+                                   [&](int stop) { return off >> stop % in_.n & 1u; }),
                     order.end());
     }
 
@@ -355,7 +359,7 @@ private:
         const int size = static_cast<int>(order.size()), last = in_.n + task;
         const auto at = [&](int i) { return i < 0 || i >= size ? -1 : order[i]; };
         // A little noise, so that ties and near ties fall either way.
-        const double noise = 1.0 + 0.001 * draw(100);
+        const double noise = 1.0 + 0.01 * draw(100);
         int load = 0;
         for (int i = 0; i <= size; ++i) {
             const double into = detour(at(i - 1), task, at(i));
@@ -688,12 +692,12 @@ nb::tuple select_tasks(const Costs& cost, std::int64_t start, const Indices& fir
 void bind_selection(nb::module_& m) {
     m.def("select_tasks", &select_tasks, nb::arg("cost"), nb::arg("start"), nb::arg("first"),
           nb::arg("last"), nb::arg("visit"), nb::arg("take"), nb::arg("capacity"),
-          nb::arg("work") = 7'000'000,
+          nb::arg("work") = 3'500'000,
           nb::sig("def select_tasks(cost: numpy.typing.NDArray[numpy.float64], start: int, "
                   "first: numpy.typing.NDArray[numpy.int32], "
                   "last: numpy.typing.NDArray[numpy.int32], "
                   "visit: numpy.typing.NDArray[numpy.bool_], take: int, capacity: int, "
-                  "work: int = 7000000) "
+                  "work: int = 3500000) "
                   "-> tuple[numpy.typing.NDArray[numpy.int32], float, bool]"),
           R"(Choose tasks and the shortest open pickup-and-delivery order, by dynamic programming.
 

@@ -166,7 +166,8 @@ def plot(rows: Sequence[Row]) -> Figure:
                 one.set_xscale("log")
             plain_ticks(one, x)
     axes[0].legend(frameon=False)
-    axes[2].legend(frameon=False, fontsize=8)
+    handles, labels = axes[2].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
     return figure
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from oath.allocate import Budget, ByPriority, Oath, Problem, plan_all, route_length
+from oath.allocate import Budget, Oath, Problem
 from oath.allocate.clustering import cluster, distances
 from oath.allocate.oath import Params as OathParams
 from oath.bench import paper
@@ -17,7 +17,7 @@ from oath.bench.figures import plain_ticks, sheet, style
 from oath.bench.sampling import grouped
 from oath.bench.study import Case, Row, Study
 from oath.dispatch import State
-from oath.runtime import pose, prepare
+from oath.runtime import Scene, assign, pose, prepare
 from oath.world.roadmap import Params
 
 if TYPE_CHECKING:
@@ -40,18 +40,19 @@ def cases(quick: bool, seeds: int) -> list[Case]:
 
 
 @cache
-def problem(tasks: int, robots: int, seed: int) -> Problem:
-    """The allocation problem at the start; seed -1 is the paper's own task set."""
-    own = seed < 0
-    mission = (
-        paper.maze(paper.TASK_SETS[tasks]) if own else paper.random_maze(tasks, robots, seed=seed)
-    )
-    return pose(prepare(mission, Params(points=2000), max(seed, 0)), State.of(mission))
+def scene(tasks: int, robots: int, seed: int) -> Scene:
+    """A mission made ready; seed -1 is the paper's own task set."""
+    if seed < 0:
+        mission = paper.maze(paper.TASK_SETS[tasks])
+    else:
+        mission = paper.random_maze(tasks, robots, seed=seed)
+    return prepare(mission, Params(points=2000), max(seed, 0))
 
 
 def measure(tasks: int, robots: int, seed: int) -> list[Row]:
     """The spread of the clusters for every K, and the routes for some."""
-    asked = problem(tasks, robots, seed)
+    ready = scene(tasks, robots, seed)
+    asked = pose(ready, State.of(ready.mission))
     all_tasks = np.arange(tasks)
     chosen = len(cluster(asked, all_tasks, elbow=True))
     rows = []
@@ -66,7 +67,7 @@ def measure(tasks: int, robots: int, seed: int) -> list[Row]:
             "elbow": chosen,
         }
         if k in COUNTS:
-            row |= routes(asked, k)
+            row |= routes(ready, k)
         rows.append(row)
     return rows
 
@@ -79,16 +80,13 @@ def spread(asked: Problem, clusters: int) -> float:
     return sum(float((distance[group.tasks, group.medoid] ** 2).sum()) for group in groups)
 
 
-def routes(asked: Problem, clusters: int) -> Row:
+def routes(ready: Scene, clusters: int) -> Row:
     """Total distance [m] and makespan [s] of all rounds with this many clusters."""
-    allocator = ByPriority(Oath(OathParams(clusters=clusters)))
-    assignment = plan_all(asked, allocator, Budget(), np.random.default_rng(0))
-    ends = [route_length(asked, r, assignment.routes[id]) for r, id in enumerate(asked.robots)]
-    times = [length / asked.speed[r] + service for r, (length, service) in enumerate(ends)]
+    found = assign(ready, Oath(OathParams(clusters=clusters)), Budget(), 0)
     return {
-        "distance_m": sum(length for length, _ in ends),
-        "makespan_s": float(max(times)),
-        "unassigned": len(assignment.unassigned),
+        "distance_m": found.total_distance,
+        "makespan_s": float(found.makespan),
+        "unassigned": len(found.assignment.unassigned),
     }
 
 
@@ -169,9 +167,10 @@ def finding(rows: Sequence[Row]) -> str:
         ]
         best = min(means, key=lambda k: means[k])
         parts.append(
-            f"On average over all missions the {what} changes by {np.ptp(list(means.values())):.1f} "
-            f"percentage points from K = {min(means)} to {max(means)} (least at K = {best}); in one "
-            f"mission by {fmean(spans):.1f} on average and {max(spans):.1f} at most."
+            f"On average over all missions the {what} changes by "
+            f"{np.ptp(list(means.values())):.1f} percentage points from K = {min(means)} to "
+            f"{max(means)} (least at K = {best}); in one mission by {fmean(spans):.1f} on average "
+            f"and {max(spans):.1f} at most."
         )
     return " ".join(parts)
 

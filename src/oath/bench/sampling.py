@@ -144,7 +144,7 @@ def plot(rows: Sequence[Row]) -> Figure:
         one.set(title=title, xlabel="sampled points", ylabel=label, xscale="log")
         plain_ticks(one, sorted({row["points"] for row in rows}))
         if column != _BEFORE:
-            one.set_ylim(bottom=0)
+            one.set_ylim(0, 1.08 * one.get_ylim()[1])
     axes[0].legend(frameon=False)
     return figure
 

@@ -14,7 +14,7 @@ import numpy as np
 from oath.allocate.problem import Problem
 from oath.allocate.selection import dynamic, program, select
 from oath.bench import paper
-from oath.bench.figures import plain_ticks, sheet, style
+from oath.bench.figures import COLOURS, plain_ticks, sheet, style
 from oath.bench.sampling import grouped
 from oath.bench.study import Case, Row, Study
 from oath.dispatch import State
@@ -22,6 +22,7 @@ from oath.runtime import pose, prepare
 from oath.world.roadmap import Params
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 CAPACITIES = range(1, 19)
@@ -88,7 +89,7 @@ def measure(
 
 def _dp(asked: Problem, capacity: int) -> Row:
     tasks = np.arange(len(asked.tasks))
-    seconds = min(_seconds(lambda: select(asked, 0, tasks)) for _ in range(REPEATS))
+    seconds = min(_seconds(lambda: select(asked, 0, tasks.tolist())) for _ in range(REPEATS))
     _, length, proven = dynamic(asked, 0, tasks, capacity)
     shortest = None
     if proven:
@@ -122,7 +123,7 @@ def _seconds(call: Callable[[], object]) -> float:
 def _gap(row: Row) -> float | None:
     """Excess [%] over the shortest path, where that is known."""
     shortest = row.get("shortest_m")
-    return None if shortest is None else 100.0 * (row["length_m"] / shortest - 1.0)
+    return None if shortest is None else round(100.0 * (row["length_m"] / shortest - 1.0), 9)
 
 
 def table(rows: Sequence[Row]) -> list[Row]:
@@ -148,7 +149,7 @@ def table(rows: Sequence[Row]) -> list[Row]:
     return out
 
 
-def _cell(rows: Sequence[Row]) -> float | str | None:
+def _cell(rows: Sequence[Row]) -> object:
     if not rows:
         return None
     stuck = sum(row["hit_limit"] for row in rows)
@@ -158,44 +159,55 @@ def _cell(rows: Sequence[Row]) -> float | str | None:
 
 
 def plot(rows: Sequence[Row]) -> Figure:
-    """Time over capacity on a logarithmic scale, and how much is proven."""
-    figure, (left, right) = sheet(1, 2, width=5.4, height=4.0)
+    """Time over capacity on a logarithmic scale, what is proven, and how near the rest is."""
+    figure, (left, middle, right) = sheet(1, 3, width=4.8, height=4.0)
     for index, (method, name) in enumerate((("dp", "DP, compiled"), ("milp", "MILP, HiGHS"))):
-        part = grouped([row for row in rows if row["method"] == method], "capacity")
-        at = sorted(part)
-        times = [[row["seconds"] for row in part[key]] for key in at]
-        x = [q for (q,) in at]
-        look = style(index)
-        left.plot(x, [median(t) for t in times], label=f"{name} (median)", **look)
-        low, high = [min(t) for t in times], [max(t) for t in times]
-        left.fill_between(x, low, high, color=look["color"], alpha=0.2, linewidth=0)
-        stuck = [(q, row["seconds"]) for (q,) in at for row in part[(q,)] if row["hit_limit"]]
-        if stuck:
-            left.scatter(
-                *zip(*stuck, strict=True), marker="x", s=70, color="black", label="hit its limit",
-                zorder=3,
-            )  # fmt: skip
+        _times(left, [row for row in rows if row["method"] == method], name, index)
     begin = 1
     for until, seconds in FIGURES:
         left.hlines(seconds, begin, until, color="black", linestyle=":", linewidth=1.2)
-        left.annotate(f"aim {seconds:g} s", (until, seconds), ha="right", va="bottom", fontsize=8)
+        text = f"aim {1e3 * seconds:g} ms"
+        left.annotate(text, (until, seconds), ha="right", va="bottom", fontsize=8)
         begin = until
-    left.set(xlabel="capacity Q (tasks to take)", ylabel="time [s]", yscale="log")
+    left.set(ylabel="time, median and range [s]", yscale="log")
     left.legend(frameon=False, loc="lower right")
     ours = grouped([row for row in rows if row["method"] == "dp"], "capacity")
     x = sorted(q for (q,) in ours)
     share = [100 * fmean(row["proven"] for row in ours[(q,)]) for q in x]
-    right.plot(x, share, label="proven shortest [% of instances]", **style(2))
+    middle.bar(x, share, color=COLOURS[2])
+    middle.set(ylabel="DP: paths proven to be shortest [%]", ylim=(0, 105))
     gaps = {q: [gap for row in ours[(q,)] if (gap := _gap(row)) is not None] for q in x}
     known = [q for q in x if gaps[q]]
-    right.plot(
-        known, [10 * fmean(gaps[q]) for q in known], label="mean gap, where known [‰]", **style(4)
-    )
-    right.set(xlabel="capacity Q (tasks to take)", ylabel="share [%], gap [‰]")
+    right.plot(known, [max(gaps[q]) for q in known], label="worst", **style(1))
+    right.plot(known, [fmean(gaps[q]) for q in known], label="mean", **style(0))
+    right.set(ylabel="DP: excess over the shortest, where known [%]")
+    right.set_ylim(-0.05, max(1.0, 1.1 * right.get_ylim()[1]))
     right.legend(frameon=False)
-    for one in (left, right):
+    for one in (left, middle, right):
+        one.set(xlabel="capacity Q (tasks to take)", xlim=(0.3, max(CAPACITIES) + 0.7))
         plain_ticks(one, range(2, 19, 2))
     return figure
+
+
+def _times(axes: Axes, rows: Sequence[Row], name: str, index: int) -> None:
+    part = grouped(rows, "capacity")
+    x = sorted(q for (q,) in part)
+    times = [[row["seconds"] for row in part[(q,)]] for q in x]
+    look = style(index)
+    axes.plot(x, [median(t) for t in times], label=name, **look)
+    low, high = [min(t) for t in times], [max(t) for t in times]
+    axes.fill_between(x, low, high, color=look["color"], alpha=0.2, linewidth=0)
+    stuck = [row for row in rows if row["hit_limit"]]
+    if stuck:
+        axes.scatter(
+            [row["capacity"] for row in stuck],
+            [row["seconds"] for row in stuck],
+            s=70,
+            color="black",
+            marker="x",
+            label="hit its limit",
+            zorder=3,
+        )
 
 
 def finding(rows: Sequence[Row]) -> str:

@@ -149,11 +149,14 @@ def _map(
     axes.set_xticks(range(len(d_opts)), [f"{value:g}" for value in d_opts])
     axes.set_yticks(range(len(sigmas)), [f"{value:g}" for value in sigmas])
     low, high = np.nanmin(values), np.nanmax(values)
+    digits = 1 if high > 10 else 2
     for (row, column), value in np.ndenumerate(values):
         dark = (value - low > 0.5 * (high - low)) == colours.endswith("_r")
         if np.isfinite(value):
             ink = "white" if dark else "black"
-            axes.text(column, row, f"{value:.3g}", ha="center", va="center", color=ink, fontsize=8)
+            axes.text(
+                column, row, f"{value:.{digits}f}", ha="center", va="center", color=ink, fontsize=8
+            )
     figure.colorbar(shown, ax=axes)
 
 
