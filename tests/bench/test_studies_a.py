@@ -101,7 +101,7 @@ def test_the_program_that_hits_its_limit_is_marked_and_ends_its_case() -> None:
     found = chosen.measure(method="milp", capacities=(1, 4, 5), seed=0, limit=0.02)
     assert found[-1]["hit_limit"] and not found[-1]["proven"]
     assert not any(row["hit_limit"] for row in found[:-1])
-    assert "hit the limit" in chosen.finding([*rows("selection"), *found])
+    assert "the limit of 0.02 s" in chosen.finding([*rows("selection"), *found])
     assert " over 0.02 s" in markdown(chosen.table(found))
     chosen.plot([*rows("selection"), *found])
 

@@ -28,7 +28,7 @@ Picks = tuple[tuple[int, StopName], ...]
 CORE_LIMIT = 32
 """Tasks that the compiled search takes, and so the most that a robot is given at once."""
 
-QUICK_WORK, LONG_WORK, MANY = 3_500_000, 40_000_000, 12
+QUICK_WORK, LONG_WORK, MANY = 3_500_000, 15_000_000, 12
 """Additions of the exact search: the first up to MANY tasks, where missions wait for the answer."""
 
 FEW, CANDIDATES = 5, 24

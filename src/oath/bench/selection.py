@@ -262,7 +262,7 @@ def _program(rows: Sequence[Row]) -> str:
     solved = max((row["capacity"] for row in rows if not row["hit_limit"]), default=0)
     text = f"The paper's program was solved up to Q = {solved}"
     return text + (
-        f"; from Q = {min(stuck)} on it hit the limit of {rows[0]['limit_seconds']:g} s."
+        f"; the first to hit the limit of {rows[0]['limit_seconds']:g} s was Q = {min(stuck)}."
         if stuck
         else " in time."
     )
