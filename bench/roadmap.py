@@ -7,7 +7,6 @@ a visibility graph on finely circumscribed corners, computed in the same run.
 from __future__ import annotations
 
 import argparse
-import math
 import resource
 import statistics
 import time
@@ -19,28 +18,12 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import Delaunay
 
 from oath import _core
+from oath.bench.shortest import exact_lengths, stop_points
 from oath.formats.mission import load
 from oath.model import Mission
 from oath.world.roadmap import MICRO, Params, World, build
-from oath.world.workspace import Mode, Workspace, corners
 
 MAZE = Path(__file__).parent.parent / "missions" / "maze-25.yaml"
-
-
-def exact_lengths(mission: Mission, stops: np.ndarray, mode: Mode) -> np.ndarray:
-    """Shortest lengths between stops (n, n) [m] from the visibility graph."""
-    workspace = Workspace(mission.map)
-    around = corners(mission.map, (), mode.radius + 1e-6, 1.0, turn=math.radians(8))
-    inside = np.all((around >= mission.map.bounds[:2]) & (around <= mission.map.bounds[2:]), axis=1)
-    around = around[inside]
-    around = around[workspace.clearance(around, mode.motion) >= mode.radius]
-    nodes = np.concatenate([stops, around])
-    i, j = np.triu_indices(len(nodes), 1)
-    seen = workspace.free(nodes[i], nodes[j], mode)
-    i, j = i[seen], j[seen]
-    length = np.hypot(*(nodes[i] - nodes[j]).T)
-    graph = csr_array((length, (i, j)), shape=(len(nodes), len(nodes)))
-    return dijkstra(graph, directed=False, indices=range(len(stops)))[:, : len(stops)]
 
 
 def pulled_lengths(world: World, nodes: list[int]) -> np.ndarray:
@@ -95,7 +78,7 @@ def build_times(mission: Mission, quick: bool) -> None:
 def quality(mission: Mission, seeds: int) -> None:
     """Print the mean excess over the exact shortest paths, over all stop pairs."""
     print(f"\n{'points':>8} {'corners':>8} {'raw excess':>11} {'pulled':>8}  (all stop pairs)")
-    stops = np.array(sorted({stop.at for task in mission.tasks for stop in task.stops}))
+    stops = stop_points(mission)
     exact = None
     off = ~np.eye(len(stops), dtype=bool)
     for points in (500, 1000, 2000):
@@ -105,7 +88,7 @@ def quality(mission: Mission, seeds: int) -> None:
                 params = Params(points=points, corners=with_corners)
                 world = build(mission, params, seed, relevant=frozenset())
                 if exact is None:
-                    exact = exact_lengths(mission, stops, world.roadmap.modes[0])
+                    exact = exact_lengths(mission.map, stops, world.roadmap.modes[0])
                 nodes = [world.stops[tuple(stop)] for stop in stops]
                 lengths = world.roadmap.travel(0, nodes, nodes)
                 raw.append((lengths[off] / exact[off] - 1).mean())

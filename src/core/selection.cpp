@@ -5,18 +5,19 @@
 // and a group and a next stop determine the new group and the new last stop: each value is computed
 // once, as a minimum over the lasts of one group, and only groups are looked up.
 //
-// Two passes: a narrow one, which keeps the most promising groups of each layer, gives an upper
-// bound; the wide one drops every state whose value plus a lower bound of the rest reaches it. When
-// the wide pass runs out of its work limit it goes on narrow, and says that it is not exact.
+// A narrow pass, which keeps the most promising groups of each layer, gives an upper bound; the wide
+// one drops every state whose value plus a lower bound of the rest reaches it. When the wide pass
+// runs out of its work limit it goes on narrow, and says that it is not exact.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
+#include "selection_bound.hpp"
+#include "selection_improve.hpp"
+
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <memory>
-#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -26,75 +27,15 @@ namespace nb = nanobind;
 
 namespace {
 
+using namespace oath::selection;
+
 constexpr int kMaxTasks = 32;
-constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr std::size_t kNarrow = 128;  // groups a layer of the first pass
-constexpr std::size_t kBeam = 3072;   // groups a layer once the work limit is reached
+constexpr int kRounds = 40;           // of improving a route, per task taken
+constexpr std::size_t kBeam = 512;    // groups a layer once the work limit is reached
 constexpr std::int64_t kLookup = 32;  // a look-up's work, in additions
 
-int count(std::uint64_t bits) { return __builtin_popcountll(bits); }
 int lowest(std::uint32_t bits) { return __builtin_ctz(bits); }
-
-// The instance on its own dense locations: stop s < n is task s's first, s >= n task s - n's last.
-struct Instance {
-    int n = 0, take = 0, capacity = 0;
-    std::uint32_t visits = 0;
-    std::vector<double> from_start;  // (n,) to each first stop
-    std::vector<double> leg;         // (2n, 2n), row = to, column = from: a row serves one minimum
-    std::vector<double> into_first;  // (n,) cheapest leg into a first stop, except from the start
-    std::vector<double> into_last;   // (n,) cheapest leg into a last stop; 0 for a visit
-    std::vector<int> by_cost;        // (n,) tasks by the sum of both
-
-    int stops() const { return 2 * n; }
-    double to(int stop, int from) const {
-        return leg[static_cast<std::size_t>(stop) * stops() + from];
-    }
-    double task_bound(int task) const { return into_first[task] + into_last[task]; }
-};
-
-// Cheapest leg into `stop` that a route may use; 0 if there is none, which bounds nothing.
-double cheapest_into(const Instance& in, int stop) {
-    const int task = stop % in.n;
-    double least = kInf;
-    for (int from = 0; from < in.stops(); ++from) {
-        const bool phantom = from >= in.n && (in.visits >> (from - in.n) & 1u);
-        const bool own = from % in.n == task && !(stop >= in.n && from == task);
-        if (!phantom && !own) least = std::min(least, in.to(stop, from));
-    }
-    return std::isfinite(least) ? least : 0.0;
-}
-
-Instance make_instance(const double* cost, std::size_t locations, std::int64_t start,
-                       const std::int32_t* first, const std::int32_t* last, const bool* visit,
-                       int n, int take, int capacity) {
-    Instance in;
-    in.n = n, in.take = take, in.capacity = capacity;
-    std::vector<std::size_t> at(2 * n);
-    for (int i = 0; i < n; ++i) {
-        at[i] = static_cast<std::size_t>(first[i]);
-        at[n + i] = static_cast<std::size_t>(visit[i] ? first[i] : last[i]);
-        if (visit[i]) in.visits |= 1u << i;
-    }
-    const auto read = [&](std::size_t a, std::size_t b) {
-        const double value = cost[a * locations + b];
-        if (!(value >= 0)) throw std::invalid_argument("cost has a negative or NaN entry");
-        return value;
-    };
-    in.from_start.resize(n);
-    for (int i = 0; i < n; ++i) in.from_start[i] = read(static_cast<std::size_t>(start), at[i]);
-    in.leg.resize(static_cast<std::size_t>(4) * n * n);
-    for (int to = 0; to < 2 * n; ++to)
-        for (int from = 0; from < 2 * n; ++from) in.leg[to * 2 * n + from] = read(at[from], at[to]);
-    in.into_first.resize(n), in.into_last.resize(n), in.by_cost.resize(n);
-    for (int i = 0; i < n; ++i) {
-        in.into_first[i] = cheapest_into(in, i);
-        in.into_last[i] = visit[i] ? 0.0 : cheapest_into(in, n + i);
-    }
-    std::iota(in.by_cost.begin(), in.by_cost.end(), 0);
-    std::stable_sort(in.by_cost.begin(), in.by_cost.end(),
-                     [&](int a, int b) { return in.task_bound(a) < in.task_bound(b); });
-    return in;
-}
 
 // A layer's groups. `value` holds, per group, one value per picked task in the order of the task
 // index: the least length that ends at the latest served stop of that task. `origin` is the last
@@ -142,12 +83,6 @@ private:
     std::size_t used_ = 0;
 };
 
-struct Result {
-    double length = kInf;
-    std::vector<int> order;
-    bool exact = true;
-};
-
 struct Open {  // an entry of the group in hand
     int stop;
     double value;
@@ -155,8 +90,10 @@ struct Open {  // an entry of the group in hand
 
 class Search {
 public:
-    Search(const Instance& in, double upper, std::size_t width, std::int64_t work)
-        : in_(in), upper_(upper), width_(width), work_(work) {}
+    // Without `relaxed`, prices alone bound; the first prices of an instance do so.
+    Search(const Instance& in, const Relaxed* relaxed, double upper, std::size_t width,
+           std::int64_t work)
+        : in_(in), relaxed_(relaxed), upper_(upper), width_(width), work_(work) {}
 
     Result run() {
         begin();
@@ -171,7 +108,7 @@ public:
     }
 
 private:
-    // Value of the rest of a group, from below: every stop is entered once, by its cheapest leg.
+    // What the stops that a group still has to make are charged for, from below.
     struct Rest {
         double due = 0.0;      // last stops of what is carried
         double more = 0.0;     // the cheapest tasks that still fit the count
@@ -181,17 +118,22 @@ private:
     Rest rest(std::uint32_t picked, std::uint32_t delivered) const {
         Rest rest;
         for (std::uint32_t bits = picked & ~delivered; bits; bits &= bits - 1)
-            rest.due += in_.into_last[lowest(bits)];
+            rest.due += in_.price[in_.n + lowest(bits)];
         int missing = in_.take - count(picked);
         for (std::size_t i = 0; missing > 0; ++i) {
-            const int task = in_.by_cost[i];
+            const int task = in_.by_price[i];
             if (picked >> task & 1u) continue;
-            rest.dearest = in_.task_bound(task);
+            rest.dearest = in_.task_price(task);
             rest.more += rest.dearest;
             rest.cheap |= 1u << task;
             --missing;
         }
         return rest;
+    }
+
+    double to_go(std::uint32_t picked, std::uint32_t delivered, int stop) const {
+        if (relaxed_ == nullptr) return 0.0;
+        return relaxed_->to_go(in_.take - count(picked), in_.take - count(delivered), stop);
     }
 
     void begin() {
@@ -201,17 +143,17 @@ private:
             const bool visit = in_.visits >> task & 1u;
             if (!visit && in_.capacity < 1) continue;
             const bool cheap = before.cheap >> task & 1u;
-            const double more = before.more - (cheap ? in_.task_bound(task) : before.dearest);
-            const double due = visit ? 0.0 : in_.into_last[task];
+            const double more = before.more - (cheap ? in_.task_price(task) : before.dearest);
+            const double due = visit ? 0.0 : in_.price[in_.n + task];
             const std::uint32_t bit = 1u << task;
-            put(layers_[0], bit, visit ? bit : 0u, task, in_.from_start[task], due + more, 0);
+            put(layers_[0], bit, visit ? bit : 0u, task, task, in_.from_start[task], due + more, 0);
         }
     }
 
     // Enter a state unless it cannot beat the upper bound.
-    void put(Layer& layer, std::uint32_t picked, std::uint32_t delivered, int task, double value,
-             double rest_bound, int origin) {
-        if (!(value + rest_bound < upper_)) return;
+    void put(Layer& layer, std::uint32_t picked, std::uint32_t delivered, int task, int stop,
+             double value, double rest_bound, int origin) {
+        if (!(value + rest_bound + to_go(picked, delivered, stop) < upper_)) return;
         spent_ += kLookup;
         const std::uint64_t key = picked | static_cast<std::uint64_t>(delivered) << 32;
         if (picked == delivered && count(picked) == in_.take) {
@@ -248,7 +190,7 @@ private:
         const Rest left = rest(picked, delivered);
         for (std::uint32_t bits = carried; bits; bits &= bits - 1) {
             const int task = lowest(bits);
-            const double bound = left.due - in_.into_last[task] + left.more;
+            const double bound = left.due - in_.price[in_.n + task] + left.more;
             step(open, size, picked, delivered | 1u << task, task, in_.n + task, bound);
         }
         if (count(picked) == in_.take) return;
@@ -258,8 +200,8 @@ private:
             const bool visit = in_.visits & bit;
             if ((picked & bit) || (full && !visit)) continue;
             const double more =
-                left.more - (left.cheap & bit ? in_.task_bound(task) : left.dearest);
-            const double bound = left.due + in_.into_last[task] + more;
+                left.more - (left.cheap & bit ? in_.task_price(task) : left.dearest);
+            const double bound = left.due + in_.price[in_.n + task] + more;
             step(open, size, picked | bit, visit ? delivered | bit : delivered, task, task, bound);
         }
     }
@@ -274,7 +216,7 @@ private:
             const double value = open[i].value + leg[open[i].stop];
             if (value < least) least = value, origin = open[i].stop;
         }
-        put(layers_.back(), picked, delivered, task, least, bound, origin);
+        put(layers_.back(), picked, delivered, task, stop, least, bound, origin);
     }
 
     // Narrow the layer if it is wider than the pass allows, or than the work that is left.
@@ -283,7 +225,7 @@ private:
         for (const std::uint64_t key : layer.keys) {
             const auto picked = static_cast<std::uint32_t>(key);
             const int more = count(picked) < in_.take ? in_.n - count(picked) : 0;
-            const int next = more + count(picked) - count(key >> 32);
+            const int next = more + count(picked) - count(static_cast<std::uint32_t>(key >> 32));
             ahead += static_cast<std::int64_t>(next) * (count(picked) + kLookup);
         }
         if (spent_ + ahead > work_) width_ = std::min(width_, kBeam);
@@ -297,9 +239,7 @@ private:
             const std::uint64_t key = layer.keys[g];
             const Rest left = rest(static_cast<std::uint32_t>(key),
                                    static_cast<std::uint32_t>(key >> 32));
-            const double* value = &layer.value[g * take];
-            rank[g] = {*std::min_element(value, value + take) + left.due + left.more,
-                       static_cast<std::uint32_t>(g)};
+            rank[g] = {promise(layer, g) + left.due + left.more, static_cast<std::uint32_t>(g)};
         }
         std::nth_element(rank.begin(), rank.begin() + width_, rank.end());
         rank.resize(width_);
@@ -313,6 +253,21 @@ private:
             kept.origin.insert(kept.origin.end(), &layer.origin[at], &layer.origin[at] + take);
         }
         layer = std::move(kept);
+    }
+
+    // The least of a group's values, each with its relaxed rest.
+    double promise(const Layer& layer, std::size_t g) const {
+        const auto picked = static_cast<std::uint32_t>(layer.keys[g]);
+        const auto delivered = static_cast<std::uint32_t>(layer.keys[g] >> 32);
+        double least = kInf;
+        std::size_t at = g * in_.take;
+        for (std::uint32_t bits = picked; bits; bits &= bits - 1, ++at) {
+            const int task = lowest(bits);
+            const bool at_last = (delivered & ~in_.visits) >> task & 1u;
+            const double rest = to_go(picked, delivered, at_last ? in_.n + task : task);
+            least = std::min(least, layer.value[at] + rest);
+        }
+        return least;
     }
 
     // Walk back from the best complete state.
@@ -352,6 +307,7 @@ private:
     };
 
     const Instance& in_;
+    const Relaxed* relaxed_;
     double upper_;
     std::size_t width_;
     std::int64_t work_, spent_ = 0;
@@ -361,13 +317,18 @@ private:
     Index index_;
 };
 
-Result select(const Instance& in, std::int64_t work) {
-    Result first = Search(in, kInf, kNarrow, work).run();
-    if (first.exact) return first;
-    Result wide = Search(in, first.length, std::numeric_limits<std::size_t>::max(), work).run();
-    if (wide.length < first.length) return wide;
-    first.exact = wide.exact;  // nothing shorter exists if every state below the bound was seen
-    return first;
+Result select(Instance in, std::int64_t work) {
+    Result best = Search(in, nullptr, kInf, kNarrow, work).run();
+    if (best.exact) return best;
+    if (best.length < kInf) Improve(in, best).run(kRounds * in.take);
+    Relaxed relaxed(in);
+    set_prices(in, relaxed, best.length);
+    constexpr std::size_t all = std::numeric_limits<std::size_t>::max();
+    Result wide = Search(in, &relaxed, best.length, all, work).run();
+    best.exact = wide.exact;  // nothing shorter exists if every state below the bound was seen
+    if (wide.length < best.length) best = std::move(wide);
+    if (!best.exact && best.length < kInf) Improve(in, best).run(kRounds * in.take);
+    return best;
 }
 
 using Costs = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
@@ -425,12 +386,12 @@ nb::tuple select_tasks(const Costs& cost, std::int64_t start, const Indices& fir
 void bind_selection(nb::module_& m) {
     m.def("select_tasks", &select_tasks, nb::arg("cost"), nb::arg("start"), nb::arg("first"),
           nb::arg("last"), nb::arg("visit"), nb::arg("take"), nb::arg("capacity"),
-          nb::arg("work") = 200'000'000,
+          nb::arg("work") = 3'500'000,
           nb::sig("def select_tasks(cost: numpy.typing.NDArray[numpy.float64], start: int, "
                   "first: numpy.typing.NDArray[numpy.int32], "
                   "last: numpy.typing.NDArray[numpy.int32], "
                   "visit: numpy.typing.NDArray[numpy.bool_], take: int, capacity: int, "
-                  "work: int = 200000000) "
+                  "work: int = 3500000) "
                   "-> tuple[numpy.typing.NDArray[numpy.int32], float, bool]"),
           R"(Choose tasks and the shortest open pickup-and-delivery order, by dynamic programming.
 

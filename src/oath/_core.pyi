@@ -138,7 +138,7 @@ def search(cost: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None)
     Ruin and recreate: better routes (lists of stops) and the iterations made. Task t has the kind 0 = delivery (stops t and n + t), 1 = visit, 2 = aboard (its delivery is stop t). cost (modes, n, n) [m] symmetric; negative seconds or iterations do not limit.
     """
 
-def select_tasks(cost: numpy.typing.NDArray[numpy.float64], start: int, first: numpy.typing.NDArray[numpy.int32], last: numpy.typing.NDArray[numpy.int32], visit: numpy.typing.NDArray[numpy.bool_], take: int, capacity: int, work: int = 200000000) -> tuple[numpy.typing.NDArray[numpy.int32], float, bool]:
+def select_tasks(cost: numpy.typing.NDArray[numpy.float64], start: int, first: numpy.typing.NDArray[numpy.int32], last: numpy.typing.NDArray[numpy.int32], visit: numpy.typing.NDArray[numpy.bool_], take: int, capacity: int, work: int = 3500000) -> tuple[numpy.typing.NDArray[numpy.int32], float, bool]:
     """
     Choose tasks and the shortest open pickup-and-delivery order, by dynamic programming.
 

@@ -64,9 +64,16 @@ def test_load_stays_within_a_capacity_below_the_count() -> None:
     assert lengths == sorted(lengths, reverse=True)
 
 
-@pytest.mark.parametrize(("n", "take"), [(12, 5), (24, 5), (32, 4), (12, 12)])
+@pytest.mark.parametrize(("n", "take"), [(12, 5), (24, 5), (32, 4), (9, 9), (8, 8)])
 def test_sizes_that_are_promised_to_be_exact(n: int, take: int) -> None:
     assert _core.select_tasks(*_arguments(n), take, take)[2]
+
+
+@pytest.mark.parametrize(("n", "take"), [(12, 12), (13, 11), (10, 9)])
+def test_more_work_proves_more_and_is_never_longer(n: int, take: int) -> None:
+    _, quick, _ = _core.select_tasks(*_arguments(n), take, take)
+    _, proven, exact = _core.select_tasks(*_arguments(n), take, take, work=400_000_000)
+    assert exact and proven <= quick + 1e-9 and quick <= 1.1 * proven
 
 
 def _arguments(n: int) -> tuple[np.ndarray, int, np.ndarray, np.ndarray, np.ndarray]:

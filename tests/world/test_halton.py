@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from oath.model import Map, Obstacle
-from oath.world.halton import Density, Halton, radical_inverse, sample
+from oath.world.halton import Density, Halton, Sampling, radical_inverse, sample
 from oath.world.workspace import Workspace
 from scenes import BOX, FLYER, GROUND, random_map
 
@@ -111,3 +111,27 @@ def test_points_suit_some_motion() -> None:
         points = sample(workspace, motions, 400, Density(), np.random.default_rng(1))
         inside = ((points > 2) & (points < 6)).all(axis=1)
         assert inside.any() == some
+
+
+@pytest.mark.parametrize("sampling", ["adaptive", "uniform", "grid", "random"])
+def test_every_sampling_keeps_its_distance_and_count(sampling: Sampling) -> None:
+    workspace, density = Workspace(WALL), Density()
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        points = sample(workspace, [GROUND], 300, density, rng, sampling)
+        assert 270 <= len(points) <= 300
+        assert len(np.unique(points, axis=0)) == len(points)
+        assert (workspace.clearance(points, GROUND) >= density.d_min).all()
+        x, y = points.T
+        assert ((x >= 0) & (x < 8) & (y >= 0) & (y < 8)).all()
+
+
+def test_only_the_adaptive_sampling_is_denser_near_the_wall() -> None:
+    workspace = Workspace(WALL)
+    near = {}
+    for sampling in ("adaptive", "uniform", "random"):
+        rng = np.random.default_rng(0)
+        points = sample(workspace, [GROUND], 4000, Density(), rng, sampling)
+        near[sampling] = (abs(points[:, 0] - 4.0) < 1.1).mean()
+    assert near["adaptive"] > 1.5 * near["uniform"]
+    assert near["random"] == pytest.approx(near["uniform"], abs=0.03)

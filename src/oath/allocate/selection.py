@@ -28,6 +28,9 @@ Picks = tuple[tuple[int, StopName], ...]
 CORE_LIMIT = 32
 """Tasks that the compiled search takes, and so the most that a robot is given at once."""
 
+QUICK_WORK, LONG_WORK, MANY = 3_500_000, 15_000_000, 12
+"""Additions of the exact search: the first for FEW to MANY tasks; fewer seldom need as much."""
+
 FEW, CANDIDATES = 5, 24
 """Up to FEW tasks are chosen among CORE_LIMIT candidates, more of them among CANDIDATES."""
 
@@ -49,9 +52,10 @@ def select(
         Indices of tasks; those that the robot cannot do are passed over.
     method
         ``dp``: dynamic programming, exact wherever its bounds keep it within its work limit: on all
-        random instances tried with 12 tasks of 12, 7 of 16, 5 of 24 or 4 of 32. Beyond, a beam
-        search takes over where the limit is met. Among more candidates than `CORE_LIMIT` or
-        `CANDIDATES` the nearest are kept first (see `nearest`), so even 18 tasks stay below 0.7 s.
+        random instances tried with 9 tasks of 9, 5 of 24 or 4 of 32. Where the limit is met, a beam
+        search and ruin and recreate take over, so that 12 tasks take about 30 ms and 18 stay far
+        below 0.7 s. Among more candidates than `CORE_LIMIT` or `CANDIDATES` the nearest are kept
+        first (see `nearest`).
         ``milp``: the paper's program, solved by HiGHS; exact, for few tasks.
 
     Returns
@@ -66,7 +70,10 @@ def select(
         limit = CORE_LIMIT if take <= FEW else max(take, CANDIDATES)
         tasks = nearest(problem, robot, tasks, limit)
     for count in range(take, 0, -1):
-        stops = (_dynamic if method == "dp" else _milp)(problem, robot, tasks, count)
+        if method == "dp":
+            stops, _, _ = dynamic(problem, robot, tasks, count)
+        else:
+            stops = program(problem, robot, tasks, count)
         if stops:
             return _picks(problem, tasks, stops)
     return ()
@@ -106,8 +113,28 @@ def _picks(problem: Problem, tasks: NDArray[np.intp], stops: Sequence[int]) -> P
     return tuple(picks)
 
 
-def _dynamic(problem: Problem, robot: int, tasks: NDArray[np.intp], take: int) -> list[int]:
-    order, _, _ = _core.select_tasks(
+def dynamic(
+    problem: Problem, robot: int, tasks: NDArray[np.intp], take: int, *, work: int | None = None
+) -> tuple[list[int], float, bool]:
+    """Choose and order that many of the tasks by dynamic programming.
+
+    Parameters
+    ----------
+    work
+        Additions that the exact search may spend; None = `QUICK_WORK` or `LONG_WORK`.
+
+    Returns
+    -------
+    stops
+        i = first stop of the i-th of the tasks, n + i = its last; [] if there is no such path.
+    length
+        Of the path [m].
+    exact
+        Whether it is proven to be the shortest.
+    """
+    if work is None:
+        work = QUICK_WORK if FEW < take <= MANY else LONG_WORK
+    order, length, exact = _core.select_tasks(
         problem.cost[problem.mode[robot]],
         int(problem.start[robot]),
         problem.pickup[tasks],
@@ -115,13 +142,31 @@ def _dynamic(problem: Problem, robot: int, tasks: NDArray[np.intp], take: int) -
         problem.visit[tasks],
         take,
         int(problem.capacity[robot]),
+        work,
     )
-    stops: list[int] = order.tolist()
-    return stops
+    return order.tolist(), length, exact
 
 
-def _milp(problem: Problem, robot: int, tasks: NDArray[np.intp], take: int) -> list[int]:
-    """Solve the selection as a mixed-integer linear program; [] if it has no solution."""
+def program(
+    problem: Problem,
+    robot: int,
+    tasks: NDArray[np.intp],
+    take: int,
+    *,
+    seconds: float = float("inf"),
+) -> list[int]:
+    """Choose and order that many of the tasks by a mixed-integer linear program.
+
+    Parameters
+    ----------
+    seconds
+        Wall clock after which it gives up [s].
+
+    Returns
+    -------
+    list[int]
+        Stops as `dynamic` numbers them; [] if there is no such path, or none proven in time.
+    """
     from scipy.optimize import Bounds, LinearConstraint, milp  # a third of a second to import
 
     program = _Program(problem, robot, tasks, take)
@@ -130,7 +175,7 @@ def _milp(problem: Problem, robot: int, tasks: NDArray[np.intp], take: int) -> l
         integrality=program.whole,
         bounds=Bounds(0, program.upper),
         constraints=LinearConstraint(program.matrix(), program.least, program.most),
-        options={"mip_rel_gap": 0.0},
+        options={"mip_rel_gap": 0.0, "time_limit": seconds},
     )
     return program.stops(answer.x) if answer.success else []
 

@@ -14,7 +14,7 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from oath import _core
 from oath.model import Mission, Obstacle, Point
-from oath.world.halton import Density, Halton, sample
+from oath.world.halton import Density, Halton, Sampling, sample
 from oath.world.workspace import Mode, Workspace, Zones, corners, polygon_corners
 
 Array = NDArray[np.float64]
@@ -26,9 +26,15 @@ MICRO = 1e6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How a roadmap is made; `corners=False` is the ablation without corner nodes."""
+    """How a roadmap is made.
+
+    `corners=False` and `bridges=False` are the ablations without corner nodes, and without the
+    points that `Roadmap.connect` adds between components; `sampling` compares ways to sample.
+    """
 
     points: int = 1000
+    sampling: Sampling = "adaptive"
+    bridges: bool = True
     density: Density = field(default_factory=Density)
     corners: bool = True
     margin: float = 0.01
@@ -88,7 +94,7 @@ class Roadmap:
         self._components_of = (-1, -1)
         begin = time.perf_counter()
         motions = [mode.motion for mode in modes]
-        nodes = sample(workspace, motions, params.points, params.density, rng)
+        nodes = sample(workspace, motions, params.points, params.density, rng, params.sampling)
         self.sampled = len(nodes)
         nodes = np.concatenate([nodes, self._useful(corner_points)])
         order = _along_curve(nodes)
@@ -390,7 +396,8 @@ def build(
                     wanted[mode_of[robot.id]].add(world.stops[stop.at])
     for place in sorted(relevant & mission.places.keys()):
         roadmap.insert(mission.places[place])  # only an edge that ends there visits it
-    roadmap.connect({m: sorted(nodes) for m, nodes in wanted.items()})
+    if params.bridges:
+        roadmap.connect({m: sorted(nodes) for m, nodes in wanted.items()})
     return world
 
 
