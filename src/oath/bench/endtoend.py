@@ -248,7 +248,7 @@ def _claim(rows: Sequence[Row], others: Sequence[str], column: str) -> str:
         else f"on {len(sizes) - len(lost)} of {len(sizes)} rows (not: {listed(lost)})"
     )
     return (
-        f"LNS has the least {label} {where}, {min(gains):+.1%} to {max(gains):+.1%} against the "
+        f"LNS has the least {label} {where}, by {min(gains):.1%} to {max(gains):.1%} against the "
         f"best other; run by run, in {single} of {runs}."
     )
 
