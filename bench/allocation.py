@@ -38,6 +38,7 @@ def random_problem(tasks: int, robots: int, capacity: int, seed: int) -> Problem
         capacity=np.full(robots, capacity, dtype=np.int32),
         speed=np.ones(robots),
         cost=np.hypot(legs[..., 0], legs[..., 1])[None],
+        points=points,
         mode=np.zeros(robots, dtype=np.int32),
         busy=np.zeros(robots, dtype=np.bool_),
         routes=((),) * robots,

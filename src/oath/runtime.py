@@ -138,6 +138,7 @@ def pose(scene: Scene, state: State) -> Problem:
         ),
         speed=np.array([robot.speed for robot in robots]),
         cost=np.array(cost),
+        points=np.asarray(world.roadmap.nodes(), dtype=np.float64)[nodes].reshape(-1, 2),
         mode=np.array([world.mode_of[robot.id] for robot in robots], dtype=np.int32),
         busy=np.array([bool(route) for route in routed], dtype=np.bool_),
         refused=np.array(

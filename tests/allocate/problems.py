@@ -40,6 +40,7 @@ def line(
         capacity=np.full(r, capacity, dtype=np.int32),
         speed=np.ones(r),
         cost=(abs(x[:, None] - x[None]) if cost is None else cost)[None],
+        points=np.stack([x, np.zeros_like(x)], axis=1).astype(np.float64),
         mode=np.zeros(r, dtype=np.int32),
         busy=np.zeros(r, dtype=np.bool_),
         routes=((),) * r,
@@ -55,19 +56,19 @@ def problems(draw: st.DrawFn, *, robots: int = 4, tasks: int = 12, wild: bool = 
     """Random problems with several modes, types, visits and parts that cannot be reached.
 
     `wild` costs are one-sided and break the triangle inequality; otherwise they are distances
-    within each of two parts of the world.
+    within each of two parts of the world. Points are no guide where costs are wild.
     """
     r = draw(st.integers(1, robots))
     p = draw(st.integers(0, tasks))
     t, m = draw(st.integers(1, 3)), draw(st.integers(1, 2))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     size = r + 2 * p
+    points = rng.integers(0, 20, (size, 2)).astype(float)
     if wild:
         cost = rng.integers(0, 30, (m, size, size)).astype(float)
         cost[rng.random(cost.shape) < draw(st.sampled_from([0.0, 0.1, 0.4]))] = np.inf
         cost[:, np.arange(size), np.arange(size)] = 0.0
     else:
-        points = rng.integers(0, 20, (size, 2)).astype(float)
         legs = points[:, None] - points[None]
         part = rng.random((m, size)) < draw(st.sampled_from([0.0, 0.2]))
         apart = part[:, :, None] != part[:, None]
@@ -87,6 +88,7 @@ def problems(draw: st.DrawFn, *, robots: int = 4, tasks: int = 12, wild: bool = 
         capacity=rng.integers(0, 4, r).astype(np.int32),
         speed=rng.choice([0.5, 1.0, 2.0], r),
         cost=cost,
+        points=points,
         mode=rng.integers(0, m, r).astype(np.int32),
         busy=np.zeros(r, dtype=np.bool_),
         routes=((),) * r,

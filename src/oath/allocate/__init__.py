@@ -9,6 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from oath.allocate.contract import Allocator, Budget, checked, reasons
+from oath.allocate.greedy import Greedy
+from oath.allocate.kam import Kam
+from oath.allocate.kan import Kan
 from oath.allocate.lns import Lns
 from oath.allocate.oath import Oath
 from oath.allocate.priority import ByPriority
@@ -21,8 +24,11 @@ __all__ = [
     "WAITING",
     "Allocator",
     "Budget",
-    "Lns",
     "ByPriority",
+    "Greedy",
+    "Kam",
+    "Kan",
+    "Lns",
     "Oath",
     "Problem",
     "allocator",
@@ -33,7 +39,13 @@ __all__ = [
     "urgent",
 ]
 
-ALLOCATORS: dict[str, Callable[[], Allocator]] = {"lns": Lns, "oath": Oath}
+ALLOCATORS: dict[str, Callable[[], Allocator]] = {
+    "lns": Lns,
+    "oath": Oath,
+    "kam": Kam,
+    "kan": Kan,
+    "greedy": Greedy,
+}
 """Every allocator by its name, with its default parameters."""
 
 

@@ -46,11 +46,12 @@ def scores(
     clusters: Sequence[Cluster],
     feasible: NDArray[np.bool_],
     theta: float = 1.0,
+    travel: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
-    """Return (R, K) scores, lower is better: cost[r, medoid of k] / gamma[r, k] ** theta.
+    """Return (R, K) scores, lower is better: travel[r, k] / gamma[r, k] ** theta.
 
-    A robot that does not suit a cluster (gamma = 0), has nothing to do in it or cannot reach its
-    medoid has the score inf. That mask comes before theta: with theta = 0 the power would be 1.
+    A robot that does not suit a cluster (gamma = 0), has nothing to do in it or cannot travel to it
+    has the score inf. That mask comes before theta: with theta = 0 the power would be 1.
 
     Parameters
     ----------
@@ -58,9 +59,13 @@ def scores(
         (R, P) which robot can do which task.
     theta
         Weight of the specialisation; 0 = travel cost only.
+    travel
+        (R, K) how far each robot is from each cluster [m], inf = out of reach; None = its travel
+        cost to the medoid's pickup.
     """
-    medoids = problem.pickup[np.array([cluster.medoid for cluster in clusters], dtype=np.intp)]
-    travel = problem.cost[problem.mode[:, None], problem.start[:, None], medoids]
+    if travel is None:
+        medoids = problem.pickup[np.array([cluster.medoid for cluster in clusters], dtype=np.intp)]
+        travel = problem.cost[problem.mode[:, None], problem.start[:, None], medoids]
     gamma = specialisation(problem, clusters)
     open_ = (gamma > 0) & np.isfinite(travel)
     for k, cluster in enumerate(clusters):

@@ -8,6 +8,7 @@ that robots can be sent to.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Literal
 
@@ -33,7 +34,8 @@ class Cluster:
     tasks: NDArray[np.intp]
     """(n,) task indices, rising."""
     medoid: int
-    """The task with the least sum of distances to the others."""
+    """The task that stands for all: with the least sum of distances to the others, or the nearest
+    to their mean."""
     share: NDArray[np.float64]
     """(T,) part of each task type; sums to 1."""
 
@@ -86,13 +88,70 @@ def cluster(
     n, robots = len(tasks), len(problem.robots)
     if n == 0:
         return []
-    wanted = max(FEWEST, robots + 1) if clusters is None else max(1, clusters)
+    wanted = count(n, robots, clusters)
     distance = distances(problem, tasks)
-    if n < robots or (n <= wanted and not elbow):
+    if n < robots or (wanted == n and not elbow):
         groups = [[i] for i in range(n)]
     else:
-        groups = _merge(distance, min(n, wanted), elbow, linkage)
-    return [_describe(problem, tasks, distance, np.array(group)) for group in groups]
+        groups = _merge(distance, wanted, elbow, linkage)
+    found = []
+    for group in groups:
+        nearest = int(np.argmin(distance[np.ix_(group, group)].sum(axis=1)))
+        found.append(_describe(problem, tasks[group], nearest))
+    return found
+
+
+def count(tasks: int, robots: int, clusters: int | None = None) -> int:
+    """Return how many clusters to make, see `cluster`."""
+    if tasks < robots:
+        return tasks
+    wanted = max(FEWEST, robots + 1) if clusters is None else max(1, clusters)
+    return min(tasks, wanted)
+
+
+def kmeans(
+    problem: Problem,
+    tasks: NDArray[np.intp],
+    rng: np.random.Generator,
+    *,
+    clusters: int | None = None,
+) -> list[Cluster]:
+    """Group tasks by where their pickups are on the map, whatever stands in between.
+
+    Source: Lloyd, "Least squares quantization in PCM" (1982), begun as in Arthur, Vassilvitskii,
+    "k-means++: The advantages of careful seeding" (2007).
+
+    Parameters
+    ----------
+    tasks, clusters
+        As in `cluster`. Fewer clusters come out where fewer pickups differ.
+
+    Returns
+    -------
+    list[Cluster]
+        In the order of their first tasks. `medoid` is the task nearest to the centroid.
+    """
+    if not len(tasks):
+        return []
+    points = problem.points[problem.pickup[tasks]]
+    _, places = np.unique(points, axis=0, return_inverse=True)
+    wanted = min(count(len(tasks), len(problem.robots), clusters), int(places.max()) + 1)
+    labels = _lloyd(points, wanted, rng)
+    found = []
+    for group in sorted(np.flatnonzero(labels == k).tolist() for k in np.unique(labels)):
+        off = points[group] - points[group].mean(axis=0)
+        nearest = int(np.argmin(np.hypot(off[:, 0], off[:, 1])))
+        found.append(_describe(problem, tasks[group], nearest))
+    return found
+
+
+def _lloyd(points: NDArray[np.float64], wanted: int, rng: np.random.Generator) -> NDArray[np.int32]:
+    from scipy.cluster.vq import kmeans2  # a third of a second to import
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # a cluster that lost its tasks is left out
+        _, labels = kmeans2(points, wanted, iter=50, minit="++", seed=rng)
+    return labels
 
 
 def _merge(
@@ -144,13 +203,6 @@ def elbow_count(heights: NDArray[np.float64]) -> int:
     return int(np.argmax(below)) + 1
 
 
-def _describe(
-    problem: Problem,
-    tasks: NDArray[np.intp],
-    distance: NDArray[np.float64],
-    group: NDArray[np.intp],
-) -> Cluster:
-    members = tasks[group]
-    medoid = int(members[np.argmin(distance[np.ix_(group, group)].sum(axis=1))])
-    counts = np.bincount(problem.type[members], minlength=problem.capability.shape[1])
-    return Cluster(tasks=members, medoid=medoid, share=counts / len(members))
+def _describe(problem: Problem, tasks: NDArray[np.intp], medoid: int) -> Cluster:
+    counts = np.bincount(problem.type[tasks], minlength=problem.capability.shape[1])
+    return Cluster(tasks=tasks, medoid=int(tasks[medoid]), share=counts / len(tasks))

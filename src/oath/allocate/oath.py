@@ -10,13 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from oath.allocate.auction import auction, scores
+from oath.allocate.auction import scores
 from oath.allocate.clustering import Linkage, cluster
-from oath.allocate.contract import Budget, reasons, to_route
+from oath.allocate.contract import Budget
 from oath.allocate.problem import Problem
-from oath.allocate.selection import Method, Picks, select
+from oath.allocate.selection import Method, select
+from oath.allocate.stages import in_no_route as in_no_route  # its importers look here
+from oath.allocate.stages import three_stages
 from oath.model import Assignment
 
 
@@ -50,41 +51,16 @@ class Oath:
 
         At least one task is taken if an idle robot can do any.
         """
-        feasible = problem.feasible()
-        free = in_no_route(problem)
-        doable = np.flatnonzero(free & feasible.any(axis=0))
-        able = feasible & ~problem.busy[:, None] & free
-        won = self._round(problem, doable, able) if able.any() else {}
-        routes = dict(zip(problem.robots, problem.routes, strict=True))
-        for robot, picks in won.items():
-            routes[problem.robots[robot]] = to_route(problem, picks)
-            free[[task for task, _ in picks]] = False
-        return Assignment(routes=routes, unassigned=reasons(problem, np.flatnonzero(free).tolist()))
-
-    def _round(
-        self, problem: Problem, tasks: NDArray[np.intp], able: NDArray[np.bool_]
-    ) -> dict[int, Picks]:
         params = self.params
-        clusters = cluster(
-            problem, tasks, clusters=params.clusters, elbow=params.elbow, linkage=params.linkage
+        return three_stages(
+            problem,
+            group=lambda tasks: cluster(
+                problem,
+                tasks,
+                clusters=params.clusters,
+                elbow=params.elbow,
+                linkage=params.linkage,
+            ),
+            score=lambda clusters, able: scores(problem, clusters, able, params.theta),
+            choose=lambda robot, tasks: select(problem, robot, tasks, method=params.method),
         )
-        outcome = auction(scores(problem, clusters, able, params.theta))
-        won = {
-            robot: select(problem, robot, clusters[k].tasks.tolist(), method=params.method)
-            for robot, k in enumerate(outcome.won.tolist())
-            if k >= 0
-        }
-        return won or _cheapest(problem, able, params.method)
-
-
-def in_no_route(problem: Problem) -> NDArray[np.bool_]:
-    """Return (P,): the task stands in no robot's route."""
-    taken = {stop.task for route in problem.routes for stop in route}
-    return np.array([task not in taken for task in problem.tasks], dtype=np.bool_)
-
-
-def _cheapest(problem: Problem, able: NDArray[np.bool_], method: Method) -> dict[int, Picks]:
-    """Give the nearest task to its robot: a medoid can be out of reach where its tasks are not."""
-    travel = problem.cost[problem.mode[:, None], problem.start[:, None], problem.pickup]
-    robot, task = divmod(int(np.argmin(np.where(able, travel, np.inf))), len(problem.tasks))
-    return {robot: select(problem, robot, [task], method=method)}

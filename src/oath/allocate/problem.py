@@ -43,6 +43,8 @@ class Problem:
     """(R,) [m/s]."""
     cost: NDArray[np.float64]
     """(M, L, L) travel cost [m] per mode of travel, inf = unreachable."""
+    points: NDArray[np.float64]
+    """(L, 2) where the locations are [m; world frame], for those who guess costs from them."""
     mode: NDArray[np.int32]
     """(R,) which of the M cost matrices a robot uses."""
     busy: NDArray[np.bool_]
