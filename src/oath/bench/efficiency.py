@@ -65,9 +65,7 @@ def measure(swept: str, value: int, seed: int, repeats: int) -> list[Row]:
     return rows
 
 
-def _seconds(
-    problem: Problem, method: Allocator, seed: int, repeats: int
-) -> tuple[float, float]:
+def _seconds(problem: Problem, method: Allocator, seed: int, repeats: int) -> tuple[float, float]:
     """Median times [s] of one round and of all tasks, round by round."""
 
     def one() -> object:
