@@ -46,6 +46,10 @@ def random_problem(tasks: int, robots: int, capacity: int, seed: int) -> Problem
         priority=np.zeros(tasks, dtype=np.int8),
         refused=np.zeros((robots, tasks), dtype=np.bool_),
         max_tasks=np.full(robots, tasks, dtype=np.int32),
+        load=np.zeros(robots, dtype=np.int32),
+        ready=np.zeros(robots),
+        aboard=((),) * robots,
+        previous=((),) * robots,
     )
 
 

@@ -75,16 +75,17 @@ def run(
     BadInput
         If a rule is wrong or a stop is out of reach of every capable robot.
     """
-    from oath import runtime
     from oath.allocate import Budget
     from oath.allocate import allocator as named
     from oath.fleet.sim import SimFleet
+    from oath.runtime import Runtime
+    from oath.scene import prepare, require_reachable
     from oath.world.roadmap import Params
 
     chosen = named(allocator)
-    scene = runtime.prepare(mission, Params(points=points), seed)
-    runtime.require_reachable(scene)
-    return runtime.Runtime(
+    scene = prepare(mission, Params(points=points), seed)
+    require_reachable(scene)
+    return Runtime(
         scene,
         SimFleet(mission),
         name=allocator,
@@ -102,12 +103,12 @@ def allocate(
 
     Parameters and errors as for `run`.
     """
-    from oath import runtime
     from oath.allocate import Budget
     from oath.allocate import allocator as named
+    from oath.scene import assign, prepare, require_reachable
     from oath.world.roadmap import Params
 
     chosen = named(allocator)
-    scene = runtime.prepare(mission, Params(points=points), seed)
-    runtime.require_reachable(scene)
-    return runtime.assign(scene, chosen, Budget(), seed).assignment
+    scene = prepare(mission, Params(points=points), seed)
+    require_reachable(scene)
+    return assign(scene, chosen, Budget(), seed).assignment

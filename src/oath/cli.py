@@ -265,15 +265,15 @@ def plan(
 ) -> None:
     """Assign all tasks once, without executing anything."""
     import oath
-    from oath import runtime
     from oath.allocate import Budget
     from oath.allocate import allocator as named
+    from oath.scene import assign, prepare, require_reachable
     from oath.world.roadmap import Params
 
     loaded, chosen = oath.load(mission), named(allocator)
-    scene = runtime.prepare(loaded, Params(points=points), seed)
-    runtime.require_reachable(scene)
-    assigned = runtime.assign(scene, chosen, Budget(seconds=budget), seed)
+    scene = prepare(loaded, Params(points=points), seed)
+    require_reachable(scene)
+    assigned = assign(scene, chosen, Budget(seconds=budget), seed)
     assignment = assigned.assignment
     report = {
         "allocator": allocator,
@@ -326,12 +326,12 @@ def _print_plan(report: dict[str, Any]) -> None:
 def check(mission: Path, seed: int, points: int, as_json: bool) -> None:
     """Validate a mission and point out what will go wrong or looks odd."""
     import oath
-    from oath import runtime
+    from oath.scene import lint, prepare, unreachable
     from oath.world.roadmap import Params
 
-    scene = runtime.prepare(oath.load(mission), Params(points=points), seed)
-    faults = [f"task '{task}': {why}" for task, why in runtime.unreachable(scene).items()]
-    warnings = runtime.lint(scene)
+    scene = prepare(oath.load(mission), Params(points=points), seed)
+    faults = [f"task '{task}': {why}" for task, why in unreachable(scene).items()]
+    warnings = lint(scene)
     if as_json:
         _print_json({"mission": scene.mission.name, "errors": faults, "warnings": warnings})
     else:
@@ -359,12 +359,12 @@ def check(mission: Path, seed: int, points: int, as_json: bool) -> None:
 def map_(mission: Path, seed: int, points: int, png: Path | None, as_json: bool) -> None:
     """Build the roadmap; print counts, connectivity and build time."""
     import oath
-    from oath import runtime
+    from oath.scene import prepare, unreachable
     from oath.world.roadmap import Params
 
-    scene = runtime.prepare(oath.load(mission), Params(points=points), seed)
+    scene = prepare(oath.load(mission), Params(points=points), seed)
     roadmap = scene.world.roadmap
-    out_of_reach = runtime.unreachable(scene)
+    out_of_reach = unreachable(scene)
     report = {
         "points": roadmap.sampled,
         "nodes": roadmap.graph.size,

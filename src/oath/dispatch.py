@@ -33,6 +33,8 @@ class RobotState:
     position: Point
     route: Route = ()
     carrying: tuple[str, ...] = ()
+    stale: bool = False
+    """The plan ends differently than the route; it is due anew after the next stop."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,6 +48,8 @@ class State:
     completed: frozenset[str] = frozenset()
     stranded: Mapping[str, str] = field(default_factory=dict)
     """Carried tasks that cannot be delivered, and why."""
+    reconsiders: bool = False
+    """The allocator may change routes that are under way; else only idle robots get tasks."""
     refused: frozenset[tuple[str, str]] = frozenset()
     """(robot, task) pairs that turned out to have no plan."""
     unassigned: Mapping[str, str] = field(default_factory=dict)
@@ -57,10 +61,11 @@ class State:
     finished: bool = False
 
     @classmethod
-    def of(cls, mission: Mission) -> State:
+    def of(cls, mission: Mission, *, reconsiders: bool = False) -> State:
         """The state before anything happened."""
         robots = {robot.id: RobotState(position=robot.start) for robot in mission.robots}
-        return cls(t=0.0, tasks={task.id: task for task in mission.tasks}, robots=robots)
+        tasks = {task.id: task for task in mission.tasks}
+        return cls(t=0.0, tasks=tasks, robots=robots, reconsiders=reconsiders)
 
     def carried(self) -> frozenset[str]:
         """Tasks that some robot has picked up and will deliver."""
@@ -150,10 +155,14 @@ def advance(state: State, event: AnyEvent) -> tuple[State, tuple[Action, ...]]:
             return _stop_served(state, event)
         case ObstacleFound():
             busy = [id for id, robot in state.robots.items() if robot.route]
-            return state, (
+            actions: tuple[Action, ...] = (
                 UpdateMap(event.obstacle),
                 *(Repair(robot, event.obstacle) for robot in busy),
             )
+            if state.reconsiders and busy:
+                state, more = _allocate(state)
+                actions += more
+            return state, actions
         case MissionFinished():
             return replace(state, finished=True), ()
         case _:
@@ -175,11 +184,15 @@ def _allocate(state: State) -> tuple[State, tuple[Action, ...]]:
 def _allocated(state: State, event: Allocated) -> tuple[State, tuple[Action, ...]]:
     routes = _still_good(state, event.routes)
     changed = [robot for robot, route in routes.items() if route != state.robots[robot].route]
+    # A robot whose next stop stays the same drives on, and is planned for when it is there.
+    same = {robot for robot in changed if routes[robot][:1] == state.robots[robot].route[:1]}
     for robot in changed:
-        state = _with(state, robot, route=routes[robot])
+        state = _with(state, robot, route=routes[robot], stale=robot in same)
     state = replace(state, allocating=False, rounds=event.round, unassigned=dict(event.unassigned))
     # A route that was taken away is planned too: its robot must not drive on.
-    actions: tuple[Action, ...] = tuple(Plan(robot, "allocated") for robot in changed)
+    actions: tuple[Action, ...] = tuple(
+        Plan(robot, "allocated") for robot in changed if robot not in same
+    )
     if state.dirty:
         state, more = _allocate(state)
         return state, actions + more
@@ -231,6 +244,7 @@ def _planned(state: State, event: Planned) -> tuple[State, tuple[Action, ...]]:
     robot, task = state.robots[event.robot], event.unreachable
     if not robot.route:
         return state, _finish_if_still(state)
+    state = _with(state, event.robot, stale=False)
     if event.length is not None:
         return state, (Drive(event.robot),)
     # Without that task the rest may still be possible: what is carried stays, the rest goes back.
@@ -260,8 +274,8 @@ def _stop_served(state: State, event: StopServed) -> tuple[State, tuple[Action, 
     route = robot.route[1:]
     state = _with(state, event.robot, position=event.at, route=route, carrying=carrying)
     if route:
-        return state, (Drive(event.robot),)
-    if state.waiting():
+        return state, (Plan(event.robot, "allocated") if robot.stale else Drive(event.robot),)
+    if state.waiting() or (state.reconsiders and state.open_tasks()):
         return _allocate(state)
     return state, _finish_if_still(state)
 

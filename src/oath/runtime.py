@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from oath.allocate import Allocator, Budget, ByPriority, checked, plan_all, route_length
-from oath.allocate.problem import Problem
+from oath.allocate import Allocator, Budget, ByPriority, checked
 from oath.dispatch import (
     Action,
     Allocate,
@@ -24,7 +23,6 @@ from oath.dispatch import (
     UpdateMap,
     advance,
 )
-from oath.errors import BadInput
 from oath.events import (
     Allocated,
     AnyEvent,
@@ -38,182 +36,9 @@ from oath.events import (
     StopServed,
 )
 from oath.fleet import Fleet, Order
-from oath.model import Assignment, Mission, Obstacle, Point, Route, Task
-from oath.motion.mission_automaton import Rules, compile_rules
+from oath.model import Mission, Obstacle, Route, Task
 from oath.motion.planner import Planner, Service
-from oath.world.passages import missed
-from oath.world.roadmap import Params, World, build
-from oath.world.travel import TravelCosts
-
-
-@dataclass(frozen=True, slots=True)
-class Scene:
-    """A mission made ready: its roadmap with every stop on it, its rules, its travel costs."""
-
-    mission: Mission
-    world: World
-    rules: Rules
-    travel: TravelCosts
-
-
-def prepare(mission: Mission, params: Params | None = None, seed: int = 0) -> Scene:
-    """Build a mission's world and compile its rules.
-
-    Raises
-    ------
-    BadInput
-        If a rule is wrong.
-    """
-    known = {*mission.zones, *mission.places, *(task.id for task in mission.tasks)}
-    rules = compile_rules(mission.rules, known, file=mission.source)
-    world = build(mission, params, seed, relevant=rules.relevant)
-    return Scene(mission, world, rules, TravelCosts(world.roadmap, rules.avoid))
-
-
-def unreachable(scene: Scene) -> dict[str, str]:
-    """Tasks that no robot can serve from its start, and why."""
-    mission = scene.mission
-    problem = pose(scene, State.of(mission))
-    cost = problem.cost[problem.mode]
-    found = {}
-    for p in np.flatnonzero(~problem.feasible().any(axis=0)):
-        task = mission.tasks[p]
-        can = np.flatnonzero(problem.capability[:, problem.type[p]] > 0)
-        there = np.isfinite(cost[can, problem.start[can], problem.pickup[p]])
-        stop = task.stops[-1] if there.any() else task.stops[0]
-        names = ", ".join(problem.robots[r] for r in can)
-        found[task.id] = f"{stop.name} ({stop.at[0]:g}, {stop.at[1]:g}) is out of reach of {names}"
-    return found
-
-
-def require_reachable(scene: Scene) -> None:
-    """Refuse a mission with a stop that no capable robot reaches.
-
-    Raises
-    ------
-    BadInput
-        Naming the first such task.
-    """
-    for id, problem in unreachable(scene).items():
-        ids = [task.id for task in scene.mission.tasks]
-        raise BadInput(
-            f"task '{id}': {problem}",
-            file=scene.mission.source,
-            field=f"tasks[{ids.index(id)}]",
-            remedy="move the stop, open a passage wider than the robots, relax a rule, "
-            "or raise --points",
-        )
-
-
-def pose(scene: Scene, state: State) -> Problem:
-    """Put the open tasks and the robots of a state as an allocation problem."""
-    mission, world = scene.mission, scene.world
-    tasks = [state.tasks[id] for id in state.open_tasks()]
-    robots = mission.robots
-    types = list(mission.task_types)
-    places: dict[int, int] = {}
-
-    def location(at: Point) -> int:
-        return places.setdefault(world.roadmap.insert(at), len(places))
-
-    start = [location(_free_at(state, robot.id)) for robot in robots]
-    first = [location(task.stops[0].at) for task in tasks]
-    last = [location(task.stops[-1].at) for task in tasks]
-    stranded = [sum(t in state.stranded for t in state.robots[r.id].carrying) for r in robots]
-    routed = [state.robots[robot.id].route for robot in robots]
-    nodes = list(places)
-    cost = [scene.travel.between(mode, nodes) for mode in range(len(world.roadmap.modes))]
-    return Problem(
-        robots=tuple(robot.id for robot in robots),
-        tasks=tuple(task.id for task in tasks),
-        start=np.array(start, dtype=np.int32),
-        pickup=np.array(first, dtype=np.int32),
-        delivery=np.array(last, dtype=np.int32),
-        visit=np.array([len(task.stops) == 1 for task in tasks], dtype=np.bool_),
-        service_time=np.array([task.service_time for task in tasks], dtype=np.float64),
-        type=np.array([types.index(task.type) for task in tasks], dtype=np.int32),
-        capability=np.array([[robot.can.get(t, 0.0) for t in types] for robot in robots]),
-        capacity=np.array(
-            [robot.capacity - n for robot, n in zip(robots, stranded, strict=True)], dtype=np.int32
-        ),
-        speed=np.array([robot.speed for robot in robots]),
-        cost=np.array(cost),
-        points=np.asarray(world.roadmap.nodes(), dtype=np.float64)[nodes].reshape(-1, 2),
-        mode=np.array([world.mode_of[robot.id] for robot in robots], dtype=np.int32),
-        busy=np.array([bool(route) for route in routed], dtype=np.bool_),
-        refused=np.array(
-            [[(robot.id, task.id) in state.refused for task in tasks] for robot in robots],
-            dtype=np.bool_,
-        ).reshape(len(robots), len(tasks)),
-        routes=tuple(routed),
-        types=tuple(types),
-        max_tasks=np.full(len(robots), max(1, len(tasks)), dtype=np.int32),
-        priority=np.array([_RANK[task.priority] for task in tasks], dtype=np.int8),
-    )
-
-
-_RANK = {"high": 1, "normal": 0, "low": -1}
-
-
-def _free_at(state: State, robot: str) -> Point:
-    """Where a robot can begin something new: where it stands, or where its route ends."""
-    here = state.robots[robot]
-    if not here.route:
-        return here.position
-    last = here.route[-1]
-    return state.tasks[last.task].stop(last.stop).at
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Assigned:
-    """One static assignment of all tasks, its wall clock [s], length [m] and makespan [s]."""
-
-    assignment: Assignment
-    seconds: float
-    total_distance: float
-    makespan: float
-
-
-def assign(scene: Scene, allocator: Allocator, budget: Budget, seed: int) -> Assigned:
-    """Assign all tasks of a mission at once, without executing anything."""
-    begin = time.perf_counter()
-    problem = pose(scene, State.of(scene.mission))
-    rng = np.random.default_rng(seed)
-    assignment = plan_all(problem, ByPriority(allocator), budget, rng)
-    seconds = time.perf_counter() - begin
-    lengths, times = [0.0], [0.0]
-    for r, robot in enumerate(problem.robots):
-        route = assignment.routes[robot]
-        length, service = route_length(problem, r, route)
-        lengths.append(length)
-        times.append(length / problem.speed[r] + service)
-    return Assigned(
-        assignment=assignment,
-        seconds=seconds,
-        total_distance=sum(lengths),
-        makespan=max(times),
-    )
-
-
-def lint(scene: Scene) -> list[str]:
-    """What looks odd about a mission, in words."""
-    mission, roadmap = scene.mission, scene.world.roadmap
-    found = []
-    needed = {task.type for task in mission.tasks}
-    for robot in mission.robots:
-        if not needed & robot.can.keys():
-            found.append(f"robot '{robot.id}' can do none of the mission's tasks")
-    for name in mission.task_types:
-        if name not in needed:
-            found.append(f"no task is of type '{name}'")
-    for m, mode in enumerate(roadmap.modes):
-        who = f"{mode.motion.name} robots of radius {mode.radius:g} m"
-        for gap in missed(roadmap, m):
-            found.append(
-                f"about {gap.area:.1f} m2 near ({gap.at[0]:g}, {gap.at[1]:g}) has room for {who}, "
-                "but the roadmap has no way there; raise --points if a passage leads there"
-            )
-    return found
+from oath.scene import Scene, pose
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,7 +83,7 @@ class Runtime:
             robot.id: Planner(world.roadmap, scene.rules, world.mode_of[robot.id], robot.start)
             for robot in mission.robots
         }
-        self._state = State.of(mission)
+        self._state = State.of(mission, reconsiders=allocator.reconsiders)
         self._events: list[AnyEvent] = []
         self._rng = np.random.default_rng(seed)
 
@@ -316,7 +141,8 @@ class Runtime:
 
     def _allocate(self) -> Allocated:
         begin = time.perf_counter()
-        problem = pose(self._scene, self._state)
+        to_go = {id: planner.to_go() for id, planner in self._planners.items()}
+        problem = pose(self._scene, self._state, to_go)
         assignment = checked(ByPriority(self._allocator), problem, self._budget, self._rng)
         return Allocated(
             t=self._state.t,
@@ -338,7 +164,8 @@ class Runtime:
             return []
         at = self._fleet.cancel(robot, at_once=True)
         begin = time.perf_counter()
-        plan = planner.replan(at)
+        stale = self._state.robots[robot].stale
+        plan = planner.begin(at, self._services(robot)) if stale else planner.replan(at)
         return [self._planned(robot, "obstacle", plan.length, plan.blocked, begin)]
 
     def _planned(

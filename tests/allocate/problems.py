@@ -48,6 +48,10 @@ def line(
         priority=np.zeros(p, dtype=np.int8),
         refused=np.zeros((r, p), dtype=np.bool_),
         max_tasks=np.full(r, max(1, p), dtype=np.int32),
+        load=np.zeros(r, dtype=np.int32),
+        ready=np.zeros(r),
+        aboard=((),) * r,
+        previous=((),) * r,
     )
 
 
@@ -96,4 +100,8 @@ def problems(draw: st.DrawFn, *, robots: int = 4, tasks: int = 12, wild: bool = 
         priority=np.zeros(p, dtype=np.int8),
         refused=np.zeros((r, p), dtype=np.bool_),
         max_tasks=np.full(r, max(1, p), dtype=np.int32),
+        load=np.zeros(r, dtype=np.int32),
+        ready=np.zeros(r),
+        aboard=((),) * r,
+        previous=((),) * r,
     )

@@ -389,3 +389,11 @@ def test_finds_are_within_range_and_never_missed_on_contact(seed: int) -> None:
                     driven = (found[obstacle.id].t - move.start) * one.speed
                     at = path.interpolate(min(driven, path.length))
                     assert found[obstacle.id].t > move.end or shape.distance(at) >= one.radius
+
+
+def test_a_map_of_kilometres_costs_no_more_than_a_yard() -> None:
+    crate = gate("crate", box(5000, 0, 6000, 9000))
+    one = robot("r", (1000, 5000), sensing=1500, speed=100)
+    mission = alone(one, crate, bounds=(0.0, 0.0, 10_000.0, 10_000.0))
+    (found,) = finds(mission, (4500, 5000))
+    assert 25.0 <= found.t <= 25.0 + 0.16

@@ -102,7 +102,8 @@ class Run:
         )
 
     def links(self) -> list[tuple[int, int, Letter]]:
-        nodes, costs, labels = self.roadmap.links(self.at, self.mode)
+        goals = [self.roadmap.insert(service.at) for service in self.services[:1]]
+        nodes, costs, labels = self.roadmap.links(self.at, self.mode, goals)
         letters = [self.roadmap.zones.classes[label] for label in labels]
         return list(zip(nodes, costs, letters, strict=True))
 
@@ -563,11 +564,14 @@ def test_pulling_shortens_but_stays_out_of_zones() -> None:
 def test_pulling_in_the_open_gives_the_straight_line() -> None:
     roadmap = small_roadmap(Map(bounds=BOX), points=100)
     planner = Planner(roadmap, rules_of(()), 0, (0.5, 0.5))
-    planner.begin((0.5, 0.5), route((7.5, 6.5)))
+    planner.begin((0.5, 0.5), route((0.6, 0.6), (7.5, 6.5)))
+    assert planner.leg() == [(0.6, 0.6)]  # a stop in sight is driven to straight
+    planner.moved((0.6, 0.6))
+    planner.served()
     way = planner.leg()
     assert len(way) > 2
-    assert along([(0.5, 0.5), *way]) == pytest.approx(np.hypot(7, 6))
-    assert planner._plan.length == pytest.approx(np.hypot(7, 6))
+    assert along([(0.6, 0.6), *way]) == pytest.approx(np.hypot(6.9, 5.9))
+    assert planner._plan.length == pytest.approx(np.hypot(6.9, 5.9))
 
 
 # --- Which obstacles matter

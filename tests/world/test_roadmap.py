@@ -473,7 +473,11 @@ def test_links_are_what_a_robot_sees() -> None:
     roadmap = small_roadmap(wall, points=80, modes=(Mode(GROUND, 0.1),))
     at = (3.0, 4.0)
     nodes, costs, labels = roadmap.links(at, 0)
-    assert len(nodes) == roadmap.params.links and labels == [0] * len(nodes)
+    assert len(nodes) >= roadmap.params.links and labels == [0] * len(nodes)
+    far = roadmap.insert((0.5, 9.5))
+    assert far in roadmap.links(at, 0, [far])[0] and far not in nodes
+    behind = roadmap.insert((6.0, 4.0))
+    assert behind not in roadmap.links(at, 0, [behind])[0]
     for node, cost in zip(nodes, costs, strict=True):
         there = roadmap.nodes()[node]
         assert there[0] < 4.0

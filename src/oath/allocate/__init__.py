@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from oath.allocate.cbba import Cbba
 from oath.allocate.contract import Allocator, Budget, checked, reasons
 from oath.allocate.greedy import Greedy
 from oath.allocate.kam import Kam
@@ -16,7 +17,7 @@ from oath.allocate.lns import Lns
 from oath.allocate.oath import Oath
 from oath.allocate.priority import ByPriority
 from oath.allocate.problem import WAITING, Problem
-from oath.allocate.rounds import plan_all, route_length, urgent
+from oath.allocate.rounds import follow, plan_all, urgent
 from oath.errors import BadInput, did_you_mean
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "Allocator",
     "Budget",
     "ByPriority",
+    "Cbba",
     "Greedy",
     "Kam",
     "Kan",
@@ -33,9 +35,9 @@ __all__ = [
     "Problem",
     "allocator",
     "checked",
+    "follow",
     "plan_all",
     "reasons",
-    "route_length",
     "urgent",
 ]
 
@@ -44,6 +46,7 @@ ALLOCATORS: dict[str, Callable[[], Allocator]] = {
     "oath": Oath,
     "kam": Kam,
     "kan": Kan,
+    "cbba": Cbba,
     "greedy": Greedy,
 }
 """Every allocator by its name, with its default parameters."""

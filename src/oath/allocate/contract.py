@@ -28,10 +28,18 @@ class Budget:
 class Allocator(Protocol):
     """Gives routes to robots.
 
+    One that `reconsiders` is asked again whenever something changes, and may change all of a route
+    but its next stop; of one that does not, idle robots get tasks, and busy ones keep theirs.
+
     Law: every task of the problem stands in one route or in `unassigned`, never in both; every
     robot has a route, ``()`` if it does nothing; what a robot carries stays with it; the same
     problem, iterations and seed give the same assignment.
     """
+
+    @property
+    def reconsiders(self) -> bool:
+        """Whether routes that are under way may change."""
+        ...
 
     def allocate(self, problem: Problem, budget: Budget, rng: np.random.Generator) -> Assignment:
         """Return the new routes of all robots, which replace the old ones."""
@@ -143,6 +151,7 @@ class _Check:
         """Stops of tasks that are no longer open stay with their robot."""
         robot, index = self.problem.robots[r], self.index
         before = [stop for stop in self.problem.routes[r] if stop.task not in index]
+        before += [RouteStop(task=t.task, stop="delivery") for t in self.problem.aboard[r]]
         after = [stop for stop in route if stop.task not in index]
         for stop in set(before) - set(after):
             self.fail(f"robot '{robot}' drops the {stop.stop} of '{stop.task}', which it carries")
@@ -155,7 +164,7 @@ class _Check:
         """Load, capability and reach along a route that is new."""
         problem, robot = self.problem, self.problem.robots[r]
         cost = problem.cost[problem.mode[r]]
-        load, at = 0, int(problem.start[r])
+        load, at = int(problem.load[r]), int(problem.start[r])
         for stop in route:
             load += {"pickup": 1, "delivery": -1}.get(stop.stop, 0)
             if load > problem.capacity[r]:

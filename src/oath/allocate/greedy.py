@@ -7,6 +7,7 @@ the traveling salesman problem" (1977), over all routes in parallel.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,8 @@ class Greedy:
     stops may go to different places of the route. Ties go to the lower robot, then to the lower
     task. Deterministic: it uses neither the budget nor the random numbers.
     """
+
+    reconsiders: ClassVar[bool] = False
 
     def allocate(self, problem: Problem, budget: Budget, rng: np.random.Generator) -> Assignment:
         """Give routes to idle robots; busy ones keep theirs."""

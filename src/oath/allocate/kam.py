@@ -8,6 +8,7 @@ that its clusters do not know of obstacles.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -41,6 +42,7 @@ class Kam:
     """
 
     params: Params = Params()
+    reconsiders: ClassVar[bool] = False
 
     def allocate(self, problem: Problem, budget: Budget, rng: np.random.Generator) -> Assignment:
         """Give routes to idle robots; busy ones keep theirs."""

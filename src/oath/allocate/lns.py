@@ -7,15 +7,21 @@ iterations.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from oath import _core
-from oath.allocate.contract import Budget, reasons, to_route
+from oath.allocate.contract import Budget, reasons
 from oath.allocate.oath import in_no_route
 from oath.allocate.problem import Problem
-from oath.model import Assignment, StopName
+from oath.allocate.rounds import follow
+from oath.model import Assignment, Route, RouteStop, StopName
+
+Routes = list[list[int]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,8 +29,10 @@ class Params:
     """What is minimised: sum of lengths [m] + `makespan_weight` [m/s] * makespan [s]."""
 
     makespan_weight: float = 1.0
-    seconds: float = 0.05
-    """Wall clock if the budget names neither seconds nor iterations [s]."""
+    iterations: int = 10_000
+    """If the budget names neither seconds nor iterations; about 50 ms for 25 tasks."""
+    switch_gain: float = 0.01
+    """Share of the objective that changing routes under way must save."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,43 +40,124 @@ class Lns:
     """Anytime search; a budget of 0 still gives the feasible routes of a greedy construction."""
 
     params: Params = Params()
+    reconsiders: ClassVar[bool] = True
 
     def allocate(self, problem: Problem, budget: Budget, rng: np.random.Generator) -> Assignment:
-        """Give routes to all robots; what they already do stays in front."""
-        feasible = problem.feasible()
-        open_ = np.flatnonzero(in_no_route(problem) & feasible.any(axis=0))
+        """Give routes to all robots; what is fixed stays in front.
+
+        Routes under way change only if that saves `switch_gain` of the objective, or serves more.
+        """
+        stops = _Stops(problem)
+        before = stops.kept(problem.previous)
+        seed = int(rng.integers(2**63))
+        steady = self._search(stops, before, seed, 0.0, 0)
         seconds, iterations = budget.seconds, budget.iterations
         if seconds is None and iterations is None:
-            seconds = self.params.seconds
-        routes, _ = _core.search(
+            iterations = self.params.iterations
+        found = self._search(stops, before, seed, seconds, iterations)
+        chosen = found
+        if any(before):
+            old, new = (stops.value(r, self.params.makespan_weight) for r in (steady, found))
+            if old[0] == new[0] and new[1] > old[1] * (1 - self.params.switch_gain):
+                chosen = steady
+        routes = stops.routes(chosen)
+        done = {stop.task for route in routes.values() for stop in route}
+        left = [p for p, task in enumerate(problem.tasks) if task not in done]
+        return Assignment(routes=routes, unassigned=reasons(problem, left))
+
+    def _search(
+        self,
+        stops: _Stops,
+        routes: Routes,
+        seed: int,
+        seconds: float | None,
+        iterations: int | None,
+    ) -> Routes:
+        problem = stops.problem
+        answer, _ = _core.search(
             cost=np.ascontiguousarray(problem.cost),
-            first=problem.pickup[open_],
-            last=problem.delivery[open_],
-            kind=problem.visit[open_].astype(np.int32),
-            owner=np.full(len(open_), -1, dtype=np.int32),
-            service=problem.service_time[open_],
-            able=np.ascontiguousarray(feasible[:, open_].T, dtype=np.uint8),
+            first=stops.first,
+            last=stops.last,
+            kind=stops.kind,
+            owner=stops.owner,
+            service=stops.service,
+            able=stops.able,
             mode=problem.mode,
             start=problem.start,
             capacity=problem.capacity,
-            aboard=np.zeros(len(problem.robots), dtype=np.int32),
+            aboard=np.array([len(loads) for loads in problem.aboard], dtype=np.int32),
             speed=problem.speed,
-            ready=np.zeros(len(problem.robots)),
+            ready=problem.ready,
             makespan_weight=self.params.makespan_weight,
-            routes=[[] for _ in problem.robots],
-            seed=int(rng.integers(2**63)),
+            routes=routes,
+            seed=seed,
             seconds=-1.0 if seconds is None else seconds,
             iterations=-1 if iterations is None else iterations,
         )
-        n = len(open_)
-        answer = {}
+        return answer
+
+
+class _Stops:
+    """The stops to be routed, as the core numbers them: open tasks first, then what is aboard."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        feasible = problem.feasible()
+        self.open = np.flatnonzero(in_no_route(problem) & feasible.any(axis=0))
+        loads = [(r, load) for r, loads in enumerate(problem.aboard) for load in loads]
+        aboard = [load.delivery for _, load in loads]
+        self.ids = [problem.tasks[p] for p in self.open] + [load.task for _, load in loads]
+        n, m = len(self.open), len(loads)
+        self.first = _ints(*problem.pickup[self.open], *aboard)
+        self.last = _ints(*problem.delivery[self.open], *aboard)
+        self.kind = _ints(*problem.visit[self.open], *[2] * m)
+        self.owner = _ints(*[-1] * n, *(r for r, _ in loads))
+        service = [load.service_time for _, load in loads]
+        self.service = np.array([*problem.service_time[self.open], *service], dtype=np.float64)
+        self.able = np.ones((n + m, len(problem.robots)), dtype=np.uint8)
+        self.able[:n] = feasible[:, self.open].T
+
+    def kept(self, routes: Sequence[Route]) -> Routes:
+        """What of these routes is not fixed, and can still be done; [] for a robot that cannot."""
+        number = {id: t for t, id in enumerate(self.ids)}
+        kept: Routes = []
+        for r, (route, fixed) in enumerate(zip(routes, self.problem.routes, strict=True)):
+            rest = route[len(fixed) :] if route[: len(fixed)] == fixed else ()
+            rest = tuple(stop for stop in rest if stop.task in number)
+            able = all(self.able[number[stop.task], r] for stop in rest)
+            if not able or not np.isfinite(follow(self.problem, r, rest)[0]):
+                rest = ()
+            kept.append([self._code(number[stop.task], stop.stop) for stop in rest])
+        return kept
+
+    def _code(self, task: int, stop: StopName) -> int:
+        is_last = stop == "delivery" and self.kind[task] == 0
+        return task + len(self.ids) if is_last else task
+
+    def routes(self, routes: Routes) -> dict[str, Route]:
+        """Every robot's whole route: what is fixed, then these stops."""
+        problem = self.problem
+        return {
+            robot: problem.routes[r] + tuple(self._stop(code) for code in routes[r])
+            for r, robot in enumerate(problem.robots)
+        }
+
+    def _stop(self, code: int) -> RouteStop:
+        n = len(self.ids)
+        names: tuple[StopName, ...] = ("pickup", "visit", "delivery")
+        name = names[2] if code >= n else names[self.kind[code]]
+        return RouteStop(task=self.ids[code % n], stop=name)
+
+    def value(self, routes: Routes, makespan_weight: float) -> tuple[int, float]:
+        """Stops served, and the objective [m]."""
+        problem, total, times = self.problem, 0.0, [0.0]
         for r, robot in enumerate(problem.robots):
-            picks: list[tuple[int, StopName]] = []
-            for stop in routes[r]:
-                task = int(open_[stop % n])
-                name: StopName = "delivery" if stop >= n else "pickup"
-                picks.append((task, "visit" if problem.visit[task] else name))
-            answer[robot] = problem.routes[r] + to_route(problem, picks)
-        done = {stop.task for route in answer.values() for stop in route}
-        left = [p for p, task in enumerate(problem.tasks) if task not in done]
-        return Assignment(routes=answer, unassigned=reasons(problem, left))
+            rest = self.routes(routes)[robot][len(problem.routes[r]) :]
+            length, service, _ = follow(problem, r, rest)
+            total += length
+            times.append(float(problem.ready[r] + length / problem.speed[r] + service))
+        return sum(map(len, routes)), total + makespan_weight * max(times)
+
+
+def _ints(*values: int) -> NDArray[np.int32]:
+    return np.array(values, dtype=np.int32)

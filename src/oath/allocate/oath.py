@@ -8,6 +8,7 @@ with the stage.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -45,6 +46,7 @@ class Oath:
     """
 
     params: Params = Params()
+    reconsiders: ClassVar[bool] = False
 
     def allocate(self, problem: Problem, budget: Budget, rng: np.random.Generator) -> Assignment:
         """Give routes to idle robots; busy ones keep theirs.

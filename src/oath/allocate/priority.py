@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from oath.allocate.contract import Allocator, Budget, reasons, stop_location
+from oath.allocate.contract import Allocator, Budget, reasons
 from oath.allocate.problem import WAITING, Problem
-from oath.allocate.rounds import urgent
+from oath.allocate.rounds import follow, urgent
 from oath.model import Assignment, Route
 
 
@@ -23,39 +24,62 @@ class ByPriority:
 
     inner: Allocator
 
+    @property
+    def reconsiders(self) -> bool:
+        """As the allocator behind it."""
+        return self.inner.reconsiders
+
     def allocate(self, problem: Problem, budget: Budget, rng: np.random.Generator) -> Assignment:
         """Give routes to robots, see `Allocator`."""
-        routes = dict(zip(problem.robots, problem.routes, strict=True))
-        taken = {stop.task for route in problem.routes for stop in route}
-        left = [p for p, task in enumerate(problem.tasks) if task not in taken]
-        start, busy = problem.start.copy(), problem.busy.copy()
-        for priority in (1, 0, -1):
-            chosen = [p for p in left if problem.priority[p] == priority]
-            if not chosen:
+        rest = problem
+        for lowest in (1, 0, -1):
+            taken = {stop.task for route in rest.routes for stop in route}
+            chosen = [
+                p
+                for p, task in enumerate(problem.tasks)
+                if task not in taken and problem.priority[p] >= lowest
+            ]
+            if not chosen and not (lowest == 0 and any(rest.aboard)):
                 continue
             part = replace(
                 problem.only(chosen),
-                start=start.copy(),
-                busy=busy.copy(),
-                routes=tuple(routes[robot] for robot in problem.robots),
+                start=rest.start,
+                ready=rest.ready,
+                busy=rest.busy,
+                routes=rest.routes,
+                aboard=rest.aboard,
             )
-            if priority == 1:
+            if lowest == 1:
                 first = urgent(part, list(range(len(chosen))))
-                new = {robot: routes[robot] + first.routes[robot] for robot in problem.robots}
+                new = {robot: old + first.routes[robot] for robot, old in _by_robot(rest)}
             else:
                 new = dict(self.inner.allocate(part, budget, rng).routes)
-            for r, robot in enumerate(problem.robots):
-                if new[robot] != routes[robot]:
-                    start[r], busy[r] = _end(part, new[robot]), True
-            routes = new
-            done = {stop.task for route in routes.values() for stop in route}
-            left = [p for p in left if problem.tasks[p] not in done]
-            if WAITING in reasons(problem, set(chosen) & set(left)).values():
+            rest = _after(rest, new)
+            done = {stop.task for route in rest.routes for stop in route}
+            left = [p for p in chosen if problem.tasks[p] not in done]
+            if lowest < 1 and WAITING in reasons(problem, left).values():
                 break
-        return Assignment(routes=routes, unassigned=reasons(problem, left))
+        done = {stop.task for route in rest.routes for stop in route}
+        left = [p for p, task in enumerate(problem.tasks) if task not in done]
+        return Assignment(routes=dict(_by_robot(rest)), unassigned=reasons(problem, left))
 
 
-def _end(problem: Problem, route: Route) -> int:
-    """Location where a route ends."""
-    last = route[-1]
-    return stop_location(problem, problem.tasks.index(last.task), last.stop)
+def _by_robot(problem: Problem) -> list[tuple[str, Route]]:
+    return list(zip(problem.robots, problem.routes, strict=True))
+
+
+def _after(problem: Problem, routes: Mapping[str, Route]) -> Problem:
+    """The problem once these routes are fixed: robots are free where and when they end."""
+    start, ready, busy = problem.start.copy(), problem.ready.copy(), problem.busy.copy()
+    aboard = list(problem.aboard)
+    for r, (robot, old) in enumerate(_by_robot(problem)):
+        new = routes[robot][len(old) :]
+        if not new:
+            continue
+        length, service, start[r] = follow(problem, r, new)
+        ready[r] += length / problem.speed[r] + service
+        busy[r] = True
+        delivered = {stop.task for stop in new}
+        aboard[r] = tuple(load for load in aboard[r] if load.task not in delivered)
+    fixed = tuple(routes[robot] for robot in problem.robots)
+    return replace(problem, start=start, ready=ready, busy=busy, routes=fixed, aboard=tuple(aboard))

@@ -14,9 +14,23 @@ WAITING = "waits for a robot"
 """Why a task that some robot can do is not in any route after a round."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Aboard:
+    """A task that a robot carries: only its delivery is left, and nobody else can do it."""
+
+    task: str
+    delivery: int
+    """Location of its last stop."""
+    service_time: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Problem:
     """R robots, P open tasks (not picked up by anyone yet) and L locations.
+
+    What a robot does already stands in `routes` and comes first whatever is decided: all of its
+    route for an allocator that gives idle robots something to do, the stop it is driving to for one
+    that reconsiders the rest.
 
     Indices refer to `robots`, `tasks` and the rows of `cost`. Every array is read-only.
     """
@@ -38,7 +52,9 @@ class Problem:
     capability: NDArray[np.float64]
     """(R, T) how well a robot does a type, 0 = not at all."""
     capacity: NDArray[np.int32]
-    """(R,) tasks carried at once, less what is carried now."""
+    """(R,) tasks carried at once, less those that cannot be delivered any more."""
+    load: NDArray[np.int32]
+    """(R,) tasks carried now, before anything in `routes`."""
     speed: NDArray[np.float64]
     """(R,) [m/s]."""
     cost: NDArray[np.float64]
@@ -59,6 +75,12 @@ class Problem:
     """(R, P) the robot was found unable to do the task, e.g. because a rule forbids it."""
     max_tasks: NDArray[np.int32]
     """(R,) tasks a robot may be given in all; the single-round problem has its capacity here."""
+    ready: NDArray[np.float64]
+    """(R,) when each robot is free at `start` [s from now]."""
+    aboard: tuple[tuple[Aboard, ...], ...]
+    """(R,) what each robot carries when it is free, and nothing in `routes` delivers."""
+    previous: tuple[Route, ...]
+    """(R,) what each robot was to do before this round; begins with `routes`."""
 
     def feasible(self) -> NDArray[np.bool_]:
         """(R, P): the robot can do the type, has room, reaches pickup and from there delivery."""

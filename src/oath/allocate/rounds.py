@@ -32,7 +32,7 @@ class _Fleet:
 
     @staticmethod
     def now(problem: Problem) -> _Fleet:
-        return _Fleet(problem, problem.start.copy(), np.zeros(len(problem.robots)))
+        return _Fleet(problem, problem.start.copy(), problem.ready.copy())
 
     def serve(self, robot: int, task: int, stop: str) -> None:
         """Send a robot to a stop of a task and let it work there."""
@@ -124,7 +124,8 @@ def urgent(problem: Problem, tasks: list[int]) -> Assignment:
         Tasks that are not asked for are in neither.
     """
     fleet = _Fleet.now(problem)
-    able = problem.feasible()
+    full = problem.capacity <= [len(loads) for loads in problem.aboard]
+    able = problem.feasible() & (~full[:, None] | problem.visit)
     routes: dict[str, Route] = dict.fromkeys(problem.robots, ())
     missed = []
     for task in sorted(tasks):
@@ -143,13 +144,19 @@ def urgent(problem: Problem, tasks: list[int]) -> Assignment:
     return Assignment(routes=routes, unassigned=reasons(problem, missed))
 
 
-def route_length(problem: Problem, robot: int, route: Route) -> tuple[float, float]:
-    """Length [m] of a robot's route over the problem's tasks, and its time at the stops [s]."""
+def follow(problem: Problem, robot: int, stops: Route) -> tuple[float, float, int]:
+    """Follow stops from where a robot is free: length [m], time at the stops [s], last location."""
+    index = {task: p for p, task in enumerate(problem.tasks)}
+    aboard = {load.task: load for load in problem.aboard[robot]}
     at, length, service = int(problem.start[robot]), 0.0, 0.0
-    for stop in route:
-        task = problem.tasks.index(stop.task)
-        there = stop_location(problem, task, stop.stop)
+    for stop in stops:
+        if stop.task in index:
+            task = index[stop.task]
+            there = stop_location(problem, task, stop.stop)
+            service += float(problem.service_time[task])
+        else:
+            there = aboard[stop.task].delivery
+            service += aboard[stop.task].service_time
         length += float(problem.cost[problem.mode[robot], at, there])
-        service += float(problem.service_time[task])
         at = there
-    return length, service
+    return length, service, at

@@ -255,7 +255,7 @@ def random_maze(
     at = _free_points(tasks + robots, rng)
     names = ["normal", "special"] if types == 2 else [f"type{i + 1}" for i in range(types)]
     if types == 2:
-        drawn = rng.random(tasks) < 0.2
+        drawn = (rng.random(tasks) < 0.2).astype(np.int64)
         able = np.array([[True, r % 4 in (1, 2)] for r in range(robots)])
     else:
         drawn = rng.integers(0, types, tasks)

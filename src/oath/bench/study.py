@@ -149,7 +149,7 @@ def _write(study: Study, rows: Sequence[Row], out: Path) -> Outcome:
 def shown(value: object) -> str:
     """A table cell: numbers with as many digits as one reads."""
     if isinstance(value, bool) or value is None:
-        return {True: "yes", False: "no", None: "–"}[value]  # type: ignore[index]
+        return {True: "yes", False: "no", None: "–"}[value]
     if isinstance(value, float):
         if value != value:
             return "–"

@@ -19,6 +19,12 @@ from oath.world.workspace import Workspace
 _LOOK = 0.05
 """Robots look around every so many metres [m], and at every waypoint."""
 
+_COARSE = 100
+"""Who senses far looks this often per sensing range instead: large maps cost no more than small."""
+
+_OUTLINE = 4000
+"""At most so many points of an obstacle's outline are looked at, or one every `_LOOK`."""
+
 _BUMPER = 0.02
 """A robot notices what blocks it this near to its body whether it sees it or not [m]."""
 
@@ -31,7 +37,7 @@ class _Sight:
         self._polygon = shapely.Polygon(obstacle.polygon)
         shapely.prepare(self._polygon)
         ring = self._polygon.exterior
-        along = np.arange(0.0, ring.length, _LOOK)
+        along = np.arange(0.0, ring.length, max(_LOOK, ring.length / _OUTLINE))
         outline = shapely.get_coordinates(shapely.line_interpolate_point(ring, along))
         self._outline = np.concatenate([outline, np.array(obstacle.polygon)])
         self._centre = np.array(obstacle.polygon).mean(axis=0)
@@ -218,6 +224,7 @@ class SimFleet:
         start = np.array(a, dtype=float)
         along = (np.array(b, dtype=float) - start) / length
         reach = max(body.robot.sensing, body.robot.radius + _BUMPER)
+        look = max(_LOOK, body.robot.sensing / _COARSE)
         driven = 0.0
         while driven < length:
             at = start + along * driven
@@ -225,11 +232,11 @@ class SimFleet:
             if skip <= 0.0:
                 if self._notices(body, sight, at):
                     return driven
-                skip = min(_LOOK, self._to_contact(body, sight, at))
+                skip = min(look, self._to_contact(body, sight, at))
             driven += max(skip, 1e-3)
         return None
 
     def _to_contact(self, body: _Body, sight: _Sight, at: NDArray[np.float64]) -> float:
         if not body.motion.blocked_by(sight.obstacle.kind):
-            return _LOOK
+            return math.inf
         return sight.distance(at) - body.robot.radius - _BUMPER

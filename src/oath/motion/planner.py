@@ -76,7 +76,8 @@ class Planner:
         core = self._searcher()
         states = self._after_driving_to(at)
         flags = [int(q in states) for q in range(self.rules.automaton.states)]
-        nodes, costs, labels = self.roadmap.links(at, self.mode)
+        goals = [self.roadmap.insert(service.at) for service in self._services[self._leg :][:1]]
+        nodes, costs, labels = self.roadmap.links(at, self.mode, goals)
         if len(self.roadmap.zones.classes) > self._labels_known:
             core = self._searcher()
         if (edges := self.roadmap.graph.edges) > self._edges_known:  # others inserted their stops
@@ -123,6 +124,15 @@ class Planner:
         if points:
             points[-1] = self._services[self._leg].at
         return points
+
+    def to_go(self) -> float:
+        """How far it is to the current leg's stop [m], from where the robot was last seen."""
+        if not self._plan.legs:
+            return 0.0
+        way = self._plan.legs[0]
+        hops = np.hypot(*np.diff(way, axis=0).T)
+        here = int(np.argmin(np.hypot(*(way - np.array(self.position)).T)))
+        return float(hops[here:].sum())
 
     def moved(self, to: Point) -> None:
         """The robot drove straight from where it was to a point [m]."""

@@ -190,10 +190,19 @@ class Roadmap:
         """Take an obstacle out; return the edges whose cost changed in some mode."""
         return self._refresh(self.workspace.remove(id))
 
-    def links(self, at: Point, mode: int) -> tuple[list[int], list[int], list[int]]:
-        """Nodes that a robot at a point can drive to straight, their costs [um] and labels."""
+    def links(
+        self, at: Point, mode: int, towards: Sequence[int] = ()
+    ) -> tuple[list[int], list[int], list[int]]:
+        """Nodes that a robot at a point can drive to straight, their costs [um] and labels.
+
+        These are the nearest nodes in sight, and of the nearest corner nodes and the nodes
+        `towards` which the robot drives those in sight: the way may lead straight there.
+        """
         here = np.array([at], dtype=float)
-        seen = self._in_sight(here[0], self.modes[mode])
+        far = np.concatenate([self._sights(here, np.array([-1]))[:, 1], towards]).astype(np.intp)
+        a, b = np.repeat(here, len(far), axis=0), self.nodes()[far]
+        far = far[self.workspace.free(a, b, self.modes[mode])]
+        seen = np.unique(np.concatenate([self._in_sight(here[0], self.modes[mode]), far]))
         a, b = np.repeat(here, len(seen), axis=0), self.nodes()[seen]
         costs = self._micro(a, b, self.modes[mode])
         return seen.tolist(), costs.tolist(), self.zones.labels(a, b).tolist()
