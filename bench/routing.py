@@ -114,7 +114,7 @@ def with_pyvrp(problem: Problem) -> Solve:
     from pyvrp.stop import MaxRuntime
 
     tasks, robots = len(problem.tasks), len(problem.robots)
-    nodes, cost = layout(problem)
+    _, cost = layout(problem)
     feasible = problem.feasible()
     matrices = []
     for r in range(robots):
@@ -155,6 +155,8 @@ def with_pyvrp(problem: Problem) -> Solve:
 
 class Outsider:
     """A solver from elsewhere as an allocator, so that `checked` can judge it."""
+
+    reconsiders = False
 
     def __init__(self, solve: Solve, seed: int) -> None:
         self._solve, self._seed = solve, seed

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
-from oath.allocate import ALLOCATORS, Problem, route_length
+from oath.allocate import ALLOCATORS, Problem, follow
 from oath.bench.study import Row
 from oath.dispatch import State
 from oath.model import Assignment, Mission
-from oath.runtime import pose, prepare
+from oath.scene import pose, prepare
 from oath.world.roadmap import Params
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def figures(problem: Problem, assignment: Assignment) -> tuple[float, float]:
     """Sum of all lengths [m], and the makespan [s] with the times at the stops."""
     lengths, times = [0.0], [0.0]
     for r, robot in enumerate(problem.robots):
-        length, service = route_length(problem, r, assignment.routes[robot])
+        length, service, _ = follow(problem, r, assignment.routes[robot])
         lengths.append(length)
         times.append(length / float(problem.speed[r]) + service)
     return sum(lengths), max(times)

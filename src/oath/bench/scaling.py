@@ -66,6 +66,7 @@ def measure(tasks: int, robots: int, seed: int, long: bool) -> list[Row]:
             continue
         seconds = {SHORT: 1.0, LONG: 30.0}.get(name)
         method, rng = allocator(name.split()[0]), np.random.default_rng(seed)
+        method.allocate(problem, Budget(iterations=0), np.random.default_rng(seed))  # imports
         begin = perf_counter()
         answer = plan_all(problem, method, Budget(seconds=seconds), rng)
         spent = perf_counter() - begin
