@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from itertools import combinations
 from statistics import fmean
@@ -256,11 +257,11 @@ def _claim(rows: Sequence[Row], others: Sequence[str], column: str) -> str:
 
 
 def _order(rows: Sequence[Row], column: str) -> str:
-    """The paper's order of its four methods per size, and what speaks against it."""
+    """The paper's order of its four methods, size by size, and what speaks against it."""
     methods = [name for name in present(rows) if name in PUBLISHED[column]]
     if len(methods) < 2:
         return ""
-    pairs, against = 0, []
+    pairs, against = 0, defaultdict(list)
     for (kind, tasks), group in grouped(rows, lambda r: (r["kind"], r["tasks"])).items():
         for low, high in combinations(methods, 2):
             theirs = [published(column, tasks, name) or 0.0 for name in (low, high)]
@@ -269,14 +270,16 @@ def _order(rows: Sequence[Row], column: str) -> str:
             pairs += 1
             evidence = _reversed(group, low, high, column)
             if evidence:
-                against.append(f"{kind} {tasks}: {evidence}")
+                against[low, high].append(f"{kind} {tasks}: {evidence}")
     label = MEASURES[column].split(" [")[0]
+    stand = pairs - sum(map(len, against.values()))
     verdict = "is reproduced" if not against else "is not reproduced in full"
-    text = (
-        f"The paper's order of methods by {label} {verdict}: "
-        f"{pairs - len(against)} of {pairs} pairs stand as there"
-    )
-    return text + (f"; not {'; '.join(against)}." if against else ".")
+    text = f"The paper's order of methods by {label} {verdict}: {stand} of {pairs} pairs stand"
+    reversed_ = [
+        f"{LOOKS[low].label} is above {LOOKS[high].label} on {', '.join(where)}"
+        for (low, high), where in against.items()
+    ]
+    return text + (f". Against it: {'; '.join(reversed_)}." if reversed_ else ".")
 
 
 def _reversed(group: Sequence[Row], low: str, high: str, column: str) -> str:
@@ -287,10 +290,7 @@ def _reversed(group: Sequence[Row], low: str, high: str, column: str) -> str:
     if more <= 0:
         return ""
     runs = sum(ours[low, seed] > ours[high, seed] for seed in seeds)
-    return (
-        f"{LOOKS[low].label} {more:.1%} above {LOOKS[high].label} "
-        f"(above in {runs} of {len(seeds)} runs)"
-    )
+    return f"{more:+.1%} ({runs} of {len(seeds)} runs)"
 
 
 STUDY = Study(
