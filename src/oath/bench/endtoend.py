@@ -157,6 +157,9 @@ def _bars(axes: Any, rows: Sequence[Row], column: str) -> None:
                 linewidth=1.0,
                 zorder=0.8,
             )
+            for x, value in zip(at, theirs, strict=True):
+                if value:  # its top stays visible where ours is higher
+                    axes.hlines(value, x - 0.45 * width, x + 0.45 * width, color=INK, linewidth=1.5)
         axes.plot(at, means, look.marker, color="white", markeredgecolor=INK, markersize=6)
     axes.set_xticks(range(len(sizes)), [str(n) for n in sizes])
     hatched = "; hatched: as published" if column in PUBLISHED else ""
