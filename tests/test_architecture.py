@@ -22,7 +22,7 @@ ROWS = (
     ("world",),
     ("allocate", "motion", "verify"),
     ("dispatch",),
-    ("fleet", "instruct", "store", "picture"),
+    ("scene", "fleet", "instruct", "store", "picture"),
     ("runtime",),
     ("", "cli", "service", "bench"),
 )

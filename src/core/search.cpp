@@ -127,7 +127,7 @@ public:
         double current = best_value_;
         int missing = missing_;
         const double scale = std::max(1.0, current / std::max(1, in_.size()));
-        const double hot = 0.12 * scale, cold = 0.0008 * scale;
+        const double hot = 0.4 * scale, cold = 0.006 * scale;
         double heat = hot;
         long done = 0;
         for (;; ++done) {

@@ -14,7 +14,7 @@ from oath.bench.shortest import exact_lengths
 from oath.bench.tuning import sweep
 from oath.dispatch import State
 from oath.model import Map, Motion
-from oath.runtime import pose
+from oath.scene import pose
 from oath.world.workspace import Mode
 
 SMALLEST = {

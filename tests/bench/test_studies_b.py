@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import oath
-from oath.allocate import Budget, Problem
+from oath.allocate import ALLOCATORS, Budget, Problem
 from oath.bench import Row, Study, endtoend, markdown, optimality, study
 from oath.bench.paper import FIVE_CAPABILITIES, TASK_SETS, maze, random_maze
 from oath.model import Assignment, Mission
@@ -114,7 +114,7 @@ def test_a_violation_stops_the_study(monkeypatch: pytest.MonkeyPatch) -> None:
         reconsiders = False
         allocate = staticmethod(lazy)
 
-    monkeypatch.setitem(oath.allocate.ALLOCATORS, "lns", Lazy)  # type: ignore[attr-defined]
+    monkeypatch.setitem(ALLOCATORS, "lns", Lazy)
     with pytest.raises(RuntimeError, match="maze-10, allocator lns, seed 0"):
         endtoend.measure(endtoend.OWN, 10, 0)
 

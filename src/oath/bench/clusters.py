@@ -17,7 +17,7 @@ from oath.bench.figures import plain_ticks, sheet, style
 from oath.bench.sampling import grouped
 from oath.bench.study import Case, Row, Study
 from oath.dispatch import State
-from oath.runtime import Scene, assign, pose, prepare
+from oath.scene import Scene, assign, pose, prepare
 from oath.world.roadmap import Params
 
 if TYPE_CHECKING:

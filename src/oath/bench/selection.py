@@ -18,7 +18,7 @@ from oath.bench.figures import COLOURS, plain_ticks, sheet, style
 from oath.bench.sampling import grouped
 from oath.bench.study import Case, Row, Study
 from oath.dispatch import State
-from oath.runtime import pose, prepare
+from oath.scene import pose, prepare
 from oath.world.roadmap import Params
 
 if TYPE_CHECKING:
