@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from oath.allocate.contract import Allocator, Budget, reasons, stop_location
+from oath.allocate.contract import Allocator, Budget, reasons, stop_location, with_routes
 from oath.allocate.problem import WAITING, Problem
 from oath.allocate.rounds import urgent
 from oath.model import Assignment, Route
@@ -18,7 +18,7 @@ class ByPriority:
 
     High: each task goes to the robot that can complete it soonest, before anything else. Low: only
     when every other task that can be done has a robot. Robots that got something are busy for the
-    priorities after.
+    priorities after. What the inner allocator proves stands if all tasks are of one priority.
     """
 
     inner: Allocator
@@ -29,6 +29,8 @@ class ByPriority:
         taken = {stop.task for route in problem.routes for stop in route}
         left = [p for p, task in enumerate(problem.tasks) if task not in taken]
         start, busy = problem.start.copy(), problem.busy.copy()
+        proof = Assignment(routes=routes, unassigned={})
+        alone = len({int(problem.priority[p]) for p in left}) == 1
         for priority in (1, 0, -1):
             chosen = [p for p in left if problem.priority[p] == priority]
             if not chosen:
@@ -43,7 +45,10 @@ class ByPriority:
                 first = urgent(part, list(range(len(chosen))))
                 new = {robot: routes[robot] + first.routes[robot] for robot in problem.robots}
             else:
-                new = dict(self.inner.allocate(part, budget, rng).routes)
+                answer = self.inner.allocate(part, budget, rng)
+                new = dict(answer.routes)
+                proof = answer if alone else proof
+            problem = with_routes(problem, [new[robot][len(routes[robot]) :] for robot in new])
             for r, robot in enumerate(problem.robots):
                 if new[robot] != routes[robot]:
                     start[r], busy[r] = _end(part, new[robot]), True
@@ -52,7 +57,7 @@ class ByPriority:
             left = [p for p in left if problem.tasks[p] not in done]
             if WAITING in reasons(problem, set(chosen) & set(left)).values():
                 break
-        return Assignment(routes=routes, unassigned=reasons(problem, left))
+        return replace(proof, routes=routes, unassigned=reasons(problem, left))
 
 
 def _end(problem: Problem, route: Route) -> int:
