@@ -6,9 +6,12 @@ paper's three stages are `clustering`, `auction` and `selection`; `Oath` puts th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from oath.allocate.contract import Allocator, Budget, checked, reasons
+from oath.allocate.exact import Exact
 from oath.allocate.lns import Lns
 from oath.allocate.oath import Oath
 from oath.allocate.priority import ByPriority
@@ -21,8 +24,9 @@ __all__ = [
     "WAITING",
     "Allocator",
     "Budget",
-    "Lns",
     "ByPriority",
+    "Exact",
+    "Lns",
     "Oath",
     "Problem",
     "allocator",
@@ -33,17 +37,22 @@ __all__ = [
     "urgent",
 ]
 
-ALLOCATORS: dict[str, Callable[[], Allocator]] = {"lns": Lns, "oath": Oath}
+ALLOCATORS: dict[str, Callable[[], Allocator]] = {"exact": Exact, "lns": Lns, "oath": Oath}
 """Every allocator by its name, with its default parameters."""
 
 
-def allocator(name: str) -> Allocator:
+def allocator(name: str, *, makespan_weight: float | None = None) -> Allocator:
     """Return a new allocator by its name.
+
+    Parameters
+    ----------
+    makespan_weight
+        Weight of the makespan in what it minimises [m/s]; None = its default.
 
     Raises
     ------
     BadInput
-        Nobody has this name.
+        Nobody has this name, a weight for an allocator that weighs nothing, or a negative one.
 
     Examples
     --------
@@ -55,4 +64,15 @@ def allocator(name: str) -> Allocator:
     """
     if name not in ALLOCATORS:
         raise BadInput(f"unknown allocator '{name}'", remedy=did_you_mean(name, list(ALLOCATORS)))
-    return ALLOCATORS[name]()
+    chosen = ALLOCATORS[name]()
+    if makespan_weight is None:
+        return chosen
+    if not 0 <= makespan_weight < math.inf:
+        raise BadInput(f"makespan weight {makespan_weight:g} is not a finite number from 0 up")
+    if isinstance(chosen, Exact):
+        return Exact(replace(chosen.params, makespan_weight=makespan_weight))
+    if isinstance(chosen, Lns):
+        return Lns(replace(chosen.params, makespan_weight=makespan_weight))
+    raise BadInput(
+        f"allocator '{name}' has no makespan weight", remedy="use 'lns' or 'exact', or drop it"
+    )
