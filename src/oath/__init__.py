@@ -46,6 +46,7 @@ def run(
     mission: Mission,
     *,
     allocator: str = DEFAULT_ALLOCATOR,
+    makespan_weight: float | None = None,
     seed: int = 0,
     points: int = 1000,
     on_event: Callable[[AnyEvent], None] = lambda event: None,
@@ -58,6 +59,9 @@ def run(
         What to do, from `load`.
     allocator
         Name of the allocator.
+    makespan_weight
+        Weight of the makespan beside the sum of lengths [m/s], for allocators that minimise it;
+        None = their default.
     seed
         Of the roadmap and the allocator: the same seed gives the same events, wall clock aside.
     points
@@ -73,7 +77,8 @@ def run(
     Raises
     ------
     BadInput
-        If a rule is wrong or a stop is out of reach of every capable robot.
+        If a rule is wrong, a stop is out of reach of every capable robot, or the allocator knows no
+        makespan weight.
     """
     from oath import runtime
     from oath.allocate import Budget
@@ -81,7 +86,7 @@ def run(
     from oath.fleet.sim import SimFleet
     from oath.world.roadmap import Params
 
-    chosen = named(allocator)
+    chosen = named(allocator, makespan_weight=makespan_weight)
     scene = runtime.prepare(mission, Params(points=points), seed)
     runtime.require_reachable(scene)
     return runtime.Runtime(
@@ -96,18 +101,29 @@ def run(
 
 
 def allocate(
-    mission: Mission, *, allocator: str = DEFAULT_ALLOCATOR, seed: int = 0, points: int = 2000
+    mission: Mission,
+    *,
+    allocator: str = DEFAULT_ALLOCATOR,
+    makespan_weight: float | None = None,
+    max_tasks: int | None = None,
+    seed: int = 0,
+    points: int = 2000,
 ) -> Assignment:
     """Assign all tasks of a mission at once, without executing anything.
 
-    Parameters and errors as for `run`.
+    Other parameters and errors as for `run`.
+
+    Parameters
+    ----------
+    max_tasks
+        Tasks that a robot may be given in all; None = any number.
     """
     from oath import runtime
     from oath.allocate import Budget
     from oath.allocate import allocator as named
     from oath.world.roadmap import Params
 
-    chosen = named(allocator)
+    chosen = named(allocator, makespan_weight=makespan_weight)
     scene = runtime.prepare(mission, Params(points=points), seed)
     runtime.require_reachable(scene)
-    return runtime.assign(scene, chosen, Budget(), seed).assignment
+    return runtime.assign(scene, chosen, Budget(), seed, max_tasks).assignment

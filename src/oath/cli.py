@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from oath.events import AnyEvent
     from oath.model import Mission
+    from oath.runtime import Assigned
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
@@ -84,6 +85,16 @@ def _allocator_option(command: Callable[..., None]) -> Callable[..., None]:
     )(command)
 
 
+def _weight_option(command: Callable[..., None]) -> Callable[..., None]:
+    # None tells an allocator that weighs nothing from one that was asked to.
+    return click.option(
+        "--makespan-weight",
+        type=click.FloatRange(min=0.0),
+        help="Weight of the makespan beside the sum of lengths [m/s], for allocators that minimise "
+        "both.  [default: 1]",
+    )(command)
+
+
 def _print_json(value: object) -> None:
     click.echo(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
 
@@ -102,6 +113,7 @@ def main() -> None:
 )
 @_mission_argument
 @_allocator_option
+@_weight_option
 @_seed_option
 @_points_option(1000)
 @click.option(
@@ -111,7 +123,13 @@ def main() -> None:
 )
 @_json_option
 def run(
-    mission: Path, allocator: str, seed: int, points: int, out: Path | None, as_json: bool
+    mission: Path,
+    allocator: str,
+    makespan_weight: float | None,
+    seed: int,
+    points: int,
+    out: Path | None,
+    as_json: bool,
 ) -> None:
     """Run a mission in the built-in simulator, to its last delivery."""
     import oath
@@ -123,7 +141,14 @@ def run(
             journal(event)
             show(event)
 
-        result = oath.run(loaded, allocator=allocator, seed=seed, points=points, on_event=on_event)
+        result = oath.run(
+            loaded,
+            allocator=allocator,
+            makespan_weight=makespan_weight,
+            seed=seed,
+            points=points,
+            on_event=on_event,
+        )
     if out is not None:
         from oath.picture import draw_run
 
@@ -251,17 +276,27 @@ def _seconds(ctx: click.Context, param: click.Parameter, value: str | None) -> f
 
 @main.command(
     epilog=_examples(
-        "oath plan missions/maze-25.yaml", "oath plan missions/maze-25.yaml --budget 200ms --json"
+        "oath plan missions/maze-25.yaml --allocator lns --budget 200ms --json",
+        "oath plan missions/maze-15.yaml --allocator exact --makespan-weight 0 --max-tasks 5",
     )
 )
 @_mission_argument
 @_allocator_option
+@_weight_option
+@click.option("--max-tasks", type=click.IntRange(min=1), help="Tasks per robot in all.")
 @click.option("--budget", callback=_seconds, help="Time to improve the answer: 200ms, 1.5s.")
 @_seed_option
 @_points_option(2000)
 @_json_option
 def plan(
-    mission: Path, allocator: str, budget: float | None, seed: int, points: int, as_json: bool
+    mission: Path,
+    allocator: str,
+    makespan_weight: float | None,
+    max_tasks: int | None,
+    budget: float | None,
+    seed: int,
+    points: int,
+    as_json: bool,
 ) -> None:
     """Assign all tasks once, without executing anything."""
     import oath
@@ -270,25 +305,38 @@ def plan(
     from oath.allocate import allocator as named
     from oath.world.roadmap import Params
 
-    loaded, chosen = oath.load(mission), named(allocator)
+    loaded, chosen = oath.load(mission), named(allocator, makespan_weight=makespan_weight)
     scene = runtime.prepare(loaded, Params(points=points), seed)
     runtime.require_reachable(scene)
-    assigned = runtime.assign(scene, chosen, Budget(seconds=budget), seed)
+    assigned = runtime.assign(scene, chosen, Budget(seconds=budget), seed, max_tasks)
+    weight = 1.0 if makespan_weight is None else makespan_weight
+    report = _plan_report(loaded, allocator, assigned, weight)
+    if as_json:
+        _print_json(report)
+    else:
+        _print_plan(report)
+    if report["unassigned"]:
+        raise click.exceptions.Exit(1)
+
+
+def _plan_report(
+    mission: Mission, allocator: str, assigned: Assigned, makespan_weight: float
+) -> dict[str, Any]:
     assignment = assigned.assignment
-    report = {
+    return {
         "allocator": allocator,
         "seconds": assigned.seconds,
         "total_distance": assigned.total_distance,
         "makespan": assigned.makespan,
-        "objective": assigned.total_distance + assigned.makespan,
-        "lower_bound": None,
-        "optimal": False,
+        "objective": assigned.total_distance + makespan_weight * assigned.makespan,
+        "lower_bound": assignment.lower_bound,
+        "optimal": assignment.optimal,
         "routes": {
             robot: [
                 {
                     "task": entry.task,
                     "stop": entry.stop,
-                    "at": list(loaded.task(entry.task).stop(entry.stop).at),
+                    "at": list(mission.task(entry.task).stop(entry.stop).at),
                 }
                 for entry in route
             ]
@@ -296,12 +344,6 @@ def plan(
         },
         "unassigned": dict(assignment.unassigned),
     }
-    if as_json:
-        _print_json(report)
-    else:
-        _print_plan(report)
-    if assignment.unassigned:
-        raise click.exceptions.Exit(1)
 
 
 def _print_plan(report: dict[str, Any]) -> None:
@@ -309,6 +351,10 @@ def _print_plan(report: dict[str, Any]) -> None:
         f"{report['allocator']}: {report['total_distance']:.1f} m in all, makespan "
         f"{report['makespan']:.1f} s, found in {report['seconds'] * 1e3:.1f} ms"
     )
+    if report["optimal"]:
+        click.echo("  proven optimal")
+    elif report["lower_bound"] is not None:
+        click.echo(f"  objective {report['objective']:.1f}, at least {report['lower_bound']:.1f}")
     signs = {"pickup": "+", "delivery": "-", "visit": ""}
     for robot, route in report["routes"].items():
         stops = " ".join(signs[entry["stop"]] + entry["task"] for entry in route)

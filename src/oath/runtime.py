@@ -6,7 +6,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -173,10 +173,21 @@ class Assigned:
     makespan: float
 
 
-def assign(scene: Scene, allocator: Allocator, budget: Budget, seed: int) -> Assigned:
-    """Assign all tasks of a mission at once, without executing anything."""
+def assign(
+    scene: Scene, allocator: Allocator, budget: Budget, seed: int, max_tasks: int | None = None
+) -> Assigned:
+    """Assign all tasks of a mission at once, without executing anything.
+
+    Parameters
+    ----------
+    max_tasks
+        Tasks that a robot may be given in all; None = any number.
+    """
     begin = time.perf_counter()
     problem = pose(scene, State.of(scene.mission))
+    if max_tasks is not None:
+        most = np.minimum(problem.max_tasks, max_tasks)
+        problem = replace(problem, max_tasks=most.astype(np.int32))
     rng = np.random.default_rng(seed)
     assignment = plan_all(problem, ByPriority(allocator), budget, rng)
     seconds = time.perf_counter() - begin
