@@ -825,7 +825,7 @@ skip
 upper
     Only objectives below this one [m] are looked for; inf if none is known.
 seconds, states
-    Limits of time and memory (16 bytes a state, 32 with a makespan; tables take twice that again).
+    Limits of time and memory (24 bytes a state, 40 with a makespan; tables take up to twice that again).
 
 Returns
 -------
@@ -838,7 +838,7 @@ lower
     No objective is below this one [m], unless it is below `upper`'s too.
 complete
     Whether the search ended before its limits: `value`, or else `upper`, is then the optimum. Above
-    24 tasks or 32 robots there is only `lower`.
+    32 tasks or 1000 robots there is only `lower`.
 states
     States kept.
 

@@ -20,6 +20,9 @@ from oath.allocate.problem import Problem
 from oath.allocate.selection import Picks
 from oath.model import Assignment
 
+MOST_TASKS = 32
+"""Tasks that the compiled search takes; for more of them it returns a lower bound only."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
@@ -31,7 +34,7 @@ class Params:
     makespan_weight: float = 1.0
     seconds: float = 60.0
     """Wall clock if the budget names none [s]."""
-    states: int = 30_000_000
+    states: int = 20_000_000
     """States kept at once; 24 bytes each, 40 with a makespan, some three times that in all."""
     iterations: int = 3000
     """Of the neighbourhood search, if the budget names none."""
@@ -55,15 +58,23 @@ class Exact:
         if not tasks.size:
             nothing: list[Picks] = [() for _ in problem.robots]
             return replace(assignment(problem, nothing), lower_bound=0.0, optimal=True)
-        # With little time the search must leave some for the proof.
-        first = Budget(
-            seconds=0.2 * seconds,
-            iterations=params.iterations if budget.iterations is None else budget.iterations,
-        )
-        weight = params.makespan_weight
-        known = _sound(problem, search(problem, tasks, weight, first, rng))
+        first = self._share(budget, len(tasks))
+        known = _sound(problem, search(problem, tasks, params.makespan_weight, first, rng))
         found, lower, optimal = self._prove(problem, tasks, known, begin + seconds)
         return replace(assignment(problem, found), lower_bound=lower, optimal=optimal)
+
+    def _share(self, budget: Budget, tasks: int) -> Budget:
+        """Return what the search may use of the budget; with many tasks there is no proof to come.
+
+        Without seconds it counts iterations only, since the clock would make it irreproducible.
+        """
+        seconds, iterations = budget.seconds, budget.iterations
+        many = tasks > MOST_TASKS
+        if iterations is None and not (many and seconds is not None):
+            iterations = self.params.iterations
+        if seconds is not None:
+            seconds *= 0.9 if many else 0.2
+        return Budget(seconds=seconds, iterations=iterations)
 
     def _prove(
         self, problem: Problem, tasks: NDArray[np.intp], known: list[Picks], deadline: float
