@@ -69,8 +69,8 @@ def report(tasks: int, capacity: int, most: int | None, weight: float, seconds: 
         value(problem, lns, Budget(seconds=0.2), weight),
         value(problem, Oath(), Budget(), weight),
     ]
-    # No gap is below 0 but for rounding; `abs` takes its sign away.
-    gaps = "  ".join(f"{abs(100 * (x - found) / found):8.2f} %" for x in others)
+    assert min(others) > found - 1e-6 or not answer.optimal, "a proven optimum was beaten"
+    gaps = "  ".join(f"{round(100 * (x - found) / found, 2) + 0.0:8.2f} %" for x in others)
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     proven = "yes" if answer.optimal else "no"
     print(

@@ -256,7 +256,7 @@ private:
     std::vector<int> room_;  // greatest capacity
 };
 
-// What tells one state from another, and how many tasks the robot in hand has taken, which does not.
+// What tells one state from another, and how many tasks the robot in hand took, which does not.
 struct State {
     Set taken = 0, carried = 0;
     std::uint16_t place = 0, robot = 0, count = 0;
@@ -316,8 +316,8 @@ struct Timed {
     }
 };
 
-// Open addressing. Several entries of one state may stand side by side, none of which beats another;
-// an infinite sum marks what was beaten later and must still be stepped over.
+// Open addressing. Several entries of one state may stand side by side, none of which beats
+// another; an infinite sum marks what was beaten later and must still be stepped over.
 template <class Entry>
 class Table {
 public:
@@ -469,7 +469,8 @@ private:
             if (next < in_.fleet()) offer({s.taken, 0, in_.places(), next, 0}, closed(entry));
         }
         for (int w = 0; w < in_.sites; ++w)
-            if (const Set load = s.carried & site_tasks_[w]) offer(drop(s, w), dropped(entry, s, w, load));
+            if (const Set load = s.carried & site_tasks_[w])
+                offer(drop(s, w), dropped(entry, s, w, load));
         if (s.count >= robot.most) return;
         const bool full = size(s.carried) >= robot.capacity;
         for (Set bits = all_ & ~s.taken & able_[s.robot]; bits; bits &= bits - 1) {
@@ -555,7 +556,8 @@ private:
                 service += in_.work(lowest(bits));
         for (Set bits = s.carried; bits; bits &= bits - 1) service += in_.service[lowest(bits)];
         const double shared = entry.time * in_.robots[s.robot].speed + rest + slowest_ * service;
-        return std::max({entry.time, entry.latest, least_makespan_, shared / speed_later_[s.robot]});
+        return std::max(
+            {entry.time, entry.latest, least_makespan_, shared / speed_later_[s.robot]});
     }
 
     // Where some tasks are left out a tree says nothing: each stop is entered by its cheapest leg.
@@ -607,7 +609,8 @@ private:
         };
         if (a.robot != b.robot)
             return a.taken == b.taken && !a.carried && b.place == in_.places() &&
-                   after(a) == b.robot && gives({a.taken, 0, in_.places(), b.robot, 0}, closed(from));
+                   after(a) == b.robot &&
+                   gives({a.taken, 0, in_.places(), b.robot, 0}, closed(from));
         auto& route = routes[b.robot];
         if (b.place < in_.tasks) {
             const int t = b.place;
@@ -825,7 +828,8 @@ skip
 upper
     Only objectives below this one [m] are looked for; inf if none is known.
 seconds, states
-    Limits of time and memory (24 bytes a state, 40 with a makespan; tables take up to twice that again).
+    Limits of time and memory (24 bytes a state, 40 with a makespan; tables take up to twice that
+    again).
 
 Returns
 -------
@@ -835,7 +839,7 @@ routes
 value
     Their objective [m]; inf without routes.
 lower
-    No objective is below this one [m], unless it is below `upper`'s too.
+    No objective is below this one [m]; at most `upper`.
 complete
     Whether the search ended before its limits: `value`, or else `upper`, is then the optimum. Above
     32 tasks or 1000 robots there is only `lower`.

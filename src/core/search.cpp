@@ -558,9 +558,9 @@ void bind_search(nb::module_& m) {
         "search",
         [](Matrix3 cost, Array<int> first, Array<int> last, Array<int> kind, Array<int> owner,
            Array<double> service, Bytes2 able, Array<int> mode, Array<int> start,
-           Array<int> capacity, Array<int> aboard, Array<int> most, Array<double> speed, Array<double> ready,
-           double makespan_weight, Lists routes, std::uint64_t seed, double seconds,
-           long iterations) {
+           Array<int> capacity, Array<int> aboard, Array<int> most, Array<double> speed,
+           Array<double> ready, double makespan_weight, Lists routes, std::uint64_t seed,
+           double seconds, long iterations) {
             Instance in;
             in.lambda = makespan_weight;
             in.locations = static_cast<int>(cost.shape(1));
@@ -593,7 +593,8 @@ void bind_search(nb::module_& m) {
                 if (mode.data()[r] < 0 || mode.data()[r] >= static_cast<int>(cost.shape(0)))
                     throw std::out_of_range("no such mode");
                 in.robots.push_back({mode.data()[r], place(start.data()[r]), capacity.data()[r],
-                                     aboard.data()[r], most.data()[r], speed.data()[r] * 1000.0, ready.data()[r]});
+                                     aboard.data()[r], most.data()[r], speed.data()[r] * 1000.0,
+                                     ready.data()[r]});
                 for (int stop : routes[r])
                     if (stop < 0 || stop >= 2 * n) throw std::out_of_range("no such stop");
             }
@@ -604,8 +605,8 @@ void bind_search(nb::module_& m) {
             return std::make_tuple(search.best(), done);
         },
         "cost"_a, "first"_a, "last"_a, "kind"_a, "owner"_a, "service"_a, "able"_a, "mode"_a,
-        "start"_a, "capacity"_a, "aboard"_a, "most"_a, "speed"_a, "ready"_a, "makespan_weight"_a, "routes"_a,
-        "seed"_a, "seconds"_a, "iterations"_a,
+        "start"_a, "capacity"_a, "aboard"_a, "most"_a, "speed"_a, "ready"_a,
+        "makespan_weight"_a, "routes"_a, "seed"_a, "seconds"_a, "iterations"_a,
         "Ruin and recreate: better routes (lists of stops) and the iterations made. Task t has the "
         "kind 0 = delivery (stops t and n + t), 1 = visit, 2 = aboard (its delivery is stop t). A "
         "robot is given `most` tasks at most, those aboard not counted. "

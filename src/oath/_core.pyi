@@ -160,7 +160,8 @@ def solve_exact(cost: Annotated[NDArray[numpy.float64], dict(shape=(None, None, 
     upper
         Only objectives below this one [m] are looked for; inf if none is known.
     seconds, states
-        Limits of time and memory (24 bytes a state, 40 with a makespan; tables take up to twice that again).
+        Limits of time and memory (24 bytes a state, 40 with a makespan; tables take up to twice that
+        again).
 
     Returns
     -------
@@ -170,7 +171,7 @@ def solve_exact(cost: Annotated[NDArray[numpy.float64], dict(shape=(None, None, 
     value
         Their objective [m]; inf without routes.
     lower
-        No objective is below this one [m], unless it is below `upper`'s too.
+        No objective is below this one [m]; at most `upper`.
     complete
         Whether the search ended before its limits: `value`, or else `upper`, is then the optimum. Above
         32 tasks or 1000 robots there is only `lower`.

@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from problems import line, problems
 
 from oath import _core
-from oath.allocate import Budget, Exact, Lns, Oath, Problem, allocator, checked, plan_all
+from oath.allocate import (
+    Budget,
+    ByPriority,
+    Exact,
+    Lns,
+    Oath,
+    Problem,
+    allocator,
+    checked,
+    plan_all,
+)
 from oath.allocate.exact import Params, objective
 from oath.allocate.lns import Params as LnsParams
 from oath.allocate.selection import Picks
+from oath.cli import main
 from oath.errors import BadInput
 from oath.model import Assignment
 from oracles import FleetProgram, best_assignment
@@ -229,6 +242,28 @@ def test_too_many_tasks_get_a_bound() -> None:
     assert not answer.optimal and not answer.unassigned
     assert answer.lower_bound is not None
     assert 0.2 * value(problem, answer, 1.0) < answer.lower_bound < value(problem, answer, 1.0)
+
+
+def test_a_proof_survives_only_where_one_round_did_it_all() -> None:
+    problem = random_problem(6, 1)
+    rng = np.random.default_rng(0)
+    alone = plan_all(problem, ByPriority(Exact()), FEW, rng)
+    assert alone.optimal and alone.lower_bound == pytest.approx(value(problem, alone, 1.0))
+    mixed = replace(problem, priority=np.array([1, 0, 0, 0, 0, -1], dtype=np.int8))
+    answer = plan_all(mixed, ByPriority(Exact()), FEW, rng)
+    assert not answer.optimal and answer.lower_bound is None
+
+
+def test_plan_prints_what_is_proven() -> None:
+    plan = ["plan", "missions/maze-09.yaml", "--points", "300", "--json"]
+    options = ["--allocator", "exact", "--makespan-weight", "0", "--max-tasks", "3"]
+    result = CliRunner().invoke(main, [*plan, *options])
+    report = json.loads(result.stdout)
+    assert result.exit_code == 0 and report["optimal"]
+    assert report["objective"] == report["total_distance"] == pytest.approx(report["lower_bound"])
+    assert all(len(route) <= 6 for route in report["routes"].values())
+    refused = CliRunner().invoke(main, [*plan, "--allocator", "oath", "--makespan-weight", "2"])
+    assert refused.exit_code == 2 and "no makespan weight" in refused.stderr
 
 
 def test_nothing_to_do_is_optimal() -> None:
