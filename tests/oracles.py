@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from collections.abc import Set as AbstractSet
-from itertools import combinations, permutations
+from itertools import combinations, permutations, product
 
 import numpy as np
+from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from shapely.geometry import LineString, Polygon, box
@@ -53,6 +54,129 @@ def shortest_selection(problem: Problem, robot: int, tasks: list[int], take: int
         lengths = (path_length(problem, robot, order) for order in permutations(stops))
         best = min(best, *lengths)
     return best
+
+
+# --- Whole assignments ----------------------------------------------------------------------
+
+
+def shortest_path(problem: Problem, robot: int, tasks: Sequence[int]) -> float:
+    """Return the least length over all orders of all stops of these tasks; inf if there is none."""
+    stops = [
+        (task, stop)
+        for task in tasks
+        for stop in (("visit",) if problem.visit[task] else ("pickup", "delivery"))
+    ]
+    return min(path_length(problem, robot, order) for order in permutations(stops))
+
+
+def best_assignment(problem: Problem, weight: float) -> tuple[int, float]:
+    """Return the most tasks that can be served, and the least sum + weight * makespan for those.
+
+    Tries every way to give each task to a robot that is able to do it, or to nobody. A robot's time
+    is its length / speed plus the service of its tasks, so its shortest path is its best.
+    """
+    feasible, tasks = problem.feasible(), range(len(problem.tasks))
+    work = problem.service_time * np.where(problem.visit, 1, 2)
+    known: dict[tuple[int, tuple[int, ...]], float] = {}
+    best = (0, 0.0)
+    choices = [[-1, *np.flatnonzero(feasible[:, task]).tolist()] for task in tasks]
+    for owners in product(*choices):
+        total = latest = 0.0
+        for robot in range(len(problem.robots)):
+            mine = tuple(task for task in tasks if owners[task] == robot)
+            if len(mine) > problem.max_tasks[robot]:
+                total = math.inf
+            if (robot, mine) not in known:
+                known[robot, mine] = shortest_path(problem, robot, mine)
+            length = known[robot, mine]
+            total += length
+            latest = max(latest, length / problem.speed[robot] + work[list(mine)].sum())
+        served = len(tasks) - owners.count(-1)
+        value = total + (weight * latest if weight else 0.0)
+        if value < math.inf and (-served, value) < (-best[0], best[1]):
+            best = (served, value)
+    return best
+
+
+class FleetProgram:
+    """The whole problem as a mixed-integer linear program, for `scipy.optimize.milp`.
+
+    Every robot r has a graph of its own over node 0 (where it is), 1 + i (first stop of task i) and
+    1 + n + i (its last). Variables: x[r, a, b] = the robot goes from a to b; y[r, i] = it serves
+    task i; u[r, a] = place of a node in its order; q[r, a] = its load after it; at the end the
+    makespan. Order and load rise along legs in use (Miller, Tucker, Zemlin 1960).
+    """
+
+    def __init__(self, problem: Problem, weight: float) -> None:
+        self.problem, self.weight = problem, weight
+        self.n, self.nodes = len(problem.tasks), 1 + 2 * len(problem.tasks)
+        self.columns: list[tuple[float, float, bool]] = []  # cost, greatest value, whole
+        self.rows: list[tuple[dict[int, float], float, float]] = []
+        self.makespan = self.column(weight, np.inf)
+        self.serves: list[list[int]] = [[] for _ in range(self.n)]
+        for robot in range(len(problem.robots)):
+            self.add_robot(robot)
+        for serves in self.serves:
+            self.rows.append((dict.fromkeys(serves, 1.0), 1.0, 1.0))
+
+    def column(self, cost: float, most: float, whole: bool = False) -> int:
+        self.columns.append((cost, most, whole))
+        return len(self.columns) - 1
+
+    def add_robot(self, r: int) -> None:
+        problem, n = self.problem, self.n
+        cost, able = problem.cost[problem.mode[r]], problem.feasible()[r]
+        at = [problem.start[r], *problem.pickup, *problem.delivery]
+        real = [a for a in range(1, self.nodes) if a <= n or not problem.visit[a - 1 - n]]
+        y = [self.column(0.0, float(able[i]), True) for i in range(n)]
+        for i in range(n):
+            self.serves[i].append(y[i])
+        u = [self.column(0.0, 2.0 * n) for _ in range(self.nodes)]
+        q = [self.column(0.0, float(problem.capacity[r])) for _ in range(self.nodes)]
+        legs = {
+            (a, b): self.column(cost[at[a], at[b]], 1.0, True)
+            for a in [0, *real]
+            for b in real
+            if a != b and np.isfinite(cost[at[a], at[b]])
+        }
+        self.rows.append(({x: 1.0 for (a, _), x in legs.items() if a == 0}, 0.0, 1.0))
+        self.rows.append((dict.fromkeys(y, 1.0), 0.0, float(problem.max_tasks[r])))
+        for node in real:
+            served = {y[(node - 1) % n]: -1.0}
+            into = {x: 1.0 for (_, b), x in legs.items() if b == node}
+            out = {x: 1.0 for (a, _), x in legs.items() if a == node}
+            self.rows += [(into | served, 0.0, 0.0), (out | served, -np.inf, 0.0)]
+        for (a, b), x in legs.items():
+            change = 0.0 if problem.visit[(b - 1) % n] else 1.0 if b <= n else -1.0
+            before = {} if a == 0 else {u[a]: -1.0}
+            self.rows.append(({u[b]: 1.0, x: -2.0 * n - 1, **before}, -2.0 * n, np.inf))
+            room = float(problem.capacity[r]) + 1.0
+            loaded = {} if a == 0 else {q[a]: -1.0}
+            self.rows.append(({q[b]: 1.0, x: -room, **loaded}, change - room, np.inf))
+        for i in np.flatnonzero(~problem.visit).tolist():
+            self.rows.append(({u[1 + n + i]: 1.0, u[1 + i]: -1.0, y[i]: -1.0}, 0.0, np.inf))
+        time = {x: cost[at[a], at[b]] / problem.speed[r] for (a, b), x in legs.items()}
+        work = problem.service_time * np.where(problem.visit, 1, 2)
+        time |= {y[i]: float(work[i]) for i in range(n)}
+        self.rows.append((time | {self.makespan: -1.0}, -np.inf, 0.0))
+
+    def solve(self) -> float:
+        """Return the least objective of serving every task; inf if that cannot be done."""
+        cost, most, whole = (
+            np.array(part, dtype=float) for part in zip(*self.columns, strict=True)
+        )
+        entries = [(i, j, v) for i, (row, _, _) in enumerate(self.rows) for j, v in row.items()]
+        row, column, value = zip(*entries, strict=True)
+        matrix = csr_array((value, (row, column)), shape=(len(self.rows), len(cost)))
+        least, greatest = zip(*((low, high) for _, low, high in self.rows), strict=True)
+        answer = milp(
+            cost,
+            integrality=whole,
+            bounds=Bounds(0, most),
+            constraints=LinearConstraint(matrix, least, greatest),
+            options={"mip_rel_gap": 0.0},
+        )
+        return float(answer.fun) if answer.success else math.inf
 
 
 # --- Linear temporal logic ------------------------------------------------------------------

@@ -3,6 +3,7 @@
 
 namespace nb = nanobind;
 
+void bind_exact(nb::module_& m);
 void bind_graph(nb::module_& m);
 void bind_planner(nb::module_& m);
 void bind_pull(nb::module_& m);
@@ -17,5 +18,6 @@ NB_MODULE(_core, m) {
     bind_planner(m);
     bind_pull(m);
     bind_search(m);
+    bind_exact(m);
     bind_selection(m);
 }

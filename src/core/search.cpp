@@ -51,6 +51,7 @@ struct Task {
 
 struct Robot {
     int mode, start, capacity, aboard;
+    int most;          // tasks it may be given; what is aboard does not count
     double speed;      // [mm/s]
     double ready;      // when it is free there [s]
 };
@@ -82,6 +83,7 @@ struct Route {
     std::vector<Length> hop;   // (n + 1) cost of hop i; the last is 0: routes are open
     std::int64_t length = 0;   // [mm]
     double service = 0;        // [s]
+    int given = 0;             // tasks, without those that were aboard
 };
 
 struct Place {
@@ -192,7 +194,7 @@ private:
         const std::size_t n = route.stops.size();
         route.at.resize(n + 1), route.load.resize(n + 1), route.hop.resize(n + 1);
         route.at[0] = robot.start, route.load[0] = robot.aboard;
-        route.length = 0, route.service = 0;
+        route.length = 0, route.service = 0, route.given = 0;
         for (std::size_t i = 0; i < n; ++i) {
             const int stop = route.stops[i];
             route.at[i + 1] = in_.location(stop);
@@ -200,6 +202,7 @@ private:
             route.hop[i] = cost[static_cast<std::size_t>(route.at[i]) * in_.locations + route.at[i + 1]];
             route.length += route.hop[i];
             route.service += in_.tasks[in_.task(stop)].service;
+            route.given += stop < in_.size() && in_.tasks[stop].kind != Kind::kAboard;
         }
         route.hop[n] = 0;
     }
@@ -363,6 +366,7 @@ private:
         const int n = static_cast<int>(route.stops.size());
         Place best;
         best.cost = limit;
+        if (task.kind != Kind::kAboard && route.given >= robot.most) return best;
         for (int i = 0; i <= n; ++i) {
             // What is aboard takes room up to here.
             if (task.kind == Kind::kAboard && route.load[i] > robot.capacity) break;
@@ -554,9 +558,9 @@ void bind_search(nb::module_& m) {
         "search",
         [](Matrix3 cost, Array<int> first, Array<int> last, Array<int> kind, Array<int> owner,
            Array<double> service, Bytes2 able, Array<int> mode, Array<int> start,
-           Array<int> capacity, Array<int> aboard, Array<double> speed, Array<double> ready,
-           double makespan_weight, Lists routes, std::uint64_t seed, double seconds,
-           long iterations) {
+           Array<int> capacity, Array<int> aboard, Array<int> most, Array<double> speed,
+           Array<double> ready, double makespan_weight, Lists routes, std::uint64_t seed,
+           double seconds, long iterations) {
             Instance in;
             in.lambda = makespan_weight;
             in.locations = static_cast<int>(cost.shape(1));
@@ -589,7 +593,8 @@ void bind_search(nb::module_& m) {
                 if (mode.data()[r] < 0 || mode.data()[r] >= static_cast<int>(cost.shape(0)))
                     throw std::out_of_range("no such mode");
                 in.robots.push_back({mode.data()[r], place(start.data()[r]), capacity.data()[r],
-                                     aboard.data()[r], speed.data()[r] * 1000.0, ready.data()[r]});
+                                     aboard.data()[r], most.data()[r], speed.data()[r] * 1000.0,
+                                     ready.data()[r]});
                 for (int stop : routes[r])
                     if (stop < 0 || stop >= 2 * n) throw std::out_of_range("no such stop");
             }
@@ -600,9 +605,10 @@ void bind_search(nb::module_& m) {
             return std::make_tuple(search.best(), done);
         },
         "cost"_a, "first"_a, "last"_a, "kind"_a, "owner"_a, "service"_a, "able"_a, "mode"_a,
-        "start"_a, "capacity"_a, "aboard"_a, "speed"_a, "ready"_a, "makespan_weight"_a, "routes"_a,
-        "seed"_a, "seconds"_a, "iterations"_a,
+        "start"_a, "capacity"_a, "aboard"_a, "most"_a, "speed"_a, "ready"_a,
+        "makespan_weight"_a, "routes"_a, "seed"_a, "seconds"_a, "iterations"_a,
         "Ruin and recreate: better routes (lists of stops) and the iterations made. Task t has the "
-        "kind 0 = delivery (stops t and n + t), 1 = visit, 2 = aboard (its delivery is stop t). "
+        "kind 0 = delivery (stops t and n + t), 1 = visit, 2 = aboard (its delivery is stop t). A "
+        "robot is given `most` tasks at most, those aboard not counted. "
         "cost (modes, n, n) [m] symmetric; negative seconds or iterations do not limit.");
 }

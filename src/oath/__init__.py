@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["DEFAULT_ALLOCATOR", "allocate", "load", "run"]
 
-DEFAULT_ALLOCATOR = "oath"
+DEFAULT_ALLOCATOR = "lns"
 
 # The rooms are imported when they are needed: `import oath` itself costs next to nothing.
 
@@ -48,6 +48,7 @@ def run(
     mission: Mission,
     *,
     allocator: str = DEFAULT_ALLOCATOR,
+    makespan_weight: float | None = None,
     seed: int = 0,
     points: int = 1000,
     on_event: Callable[[AnyEvent], None] = lambda event: None,
@@ -60,6 +61,9 @@ def run(
         What to do, from `load`.
     allocator
         Name of the allocator.
+    makespan_weight
+        Weight of the makespan beside the sum of lengths [m/s], for allocators that minimise it;
+        None = their default.
     seed
         Of the roadmap and the allocator: the same seed gives the same events, wall clock aside.
     points
@@ -75,7 +79,8 @@ def run(
     Raises
     ------
     BadInput
-        If a rule is wrong or a stop is out of reach of every capable robot.
+        If a rule is wrong, a stop is out of reach of every capable robot, or the allocator knows no
+        makespan weight.
     """
     from oath.allocate import Budget
     from oath.allocate import allocator as named
@@ -84,7 +89,7 @@ def run(
     from oath.scene import prepare, require_reachable
     from oath.world.roadmap import Params
 
-    chosen = named(allocator)
+    chosen = named(allocator, makespan_weight=makespan_weight)
     scene = prepare(mission, Params(points=points), seed)
     require_reachable(scene)
     return Runtime(
@@ -99,21 +104,32 @@ def run(
 
 
 def allocate(
-    mission: Mission, *, allocator: str = DEFAULT_ALLOCATOR, seed: int = 0, points: int = 2000
+    mission: Mission,
+    *,
+    allocator: str = DEFAULT_ALLOCATOR,
+    makespan_weight: float | None = None,
+    max_tasks: int | None = None,
+    seed: int = 0,
+    points: int = 2000,
 ) -> Assignment:
     """Assign all tasks of a mission at once, without executing anything.
 
-    Parameters and errors as for `run`.
+    Other parameters and errors as for `run`.
+
+    Parameters
+    ----------
+    max_tasks
+        Tasks that a robot may be given in all; None = any number.
     """
     from oath.allocate import Budget
     from oath.allocate import allocator as named
     from oath.scene import assign, prepare, require_reachable
     from oath.world.roadmap import Params
 
-    chosen = named(allocator)
+    chosen = named(allocator, makespan_weight=makespan_weight)
     scene = prepare(mission, Params(points=points), seed)
     require_reachable(scene)
-    return assign(scene, chosen, Budget(), seed).assignment
+    return assign(scene, chosen, Budget(), seed, max_tasks).assignment
 
 
 class _Package(ModuleType):

@@ -133,9 +133,55 @@ def pull(path: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C'
     Indices of the points of a path (n, 2) that remain after string pulling. Shortcuts keep the radius from the blocked kinds and touch no costly kind and no labelled zone.
     """
 
-def search(cost: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], first: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], last: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], kind: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], owner: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], service: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], able: Annotated[NDArray[numpy.uint8], dict(shape=(None, None), order='C', device='cpu', writable=False)], mode: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], start: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], capacity: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], aboard: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], speed: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], ready: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], makespan_weight: float, routes: Sequence[Sequence[int]], seed: int, seconds: float, iterations: int) -> tuple[list[list[int]], int]:
+def search(cost: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], first: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], last: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], kind: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], owner: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], service: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], able: Annotated[NDArray[numpy.uint8], dict(shape=(None, None), order='C', device='cpu', writable=False)], mode: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], start: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], capacity: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], aboard: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], most: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], speed: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], ready: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], makespan_weight: float, routes: Sequence[Sequence[int]], seed: int, seconds: float, iterations: int) -> tuple[list[list[int]], int]:
     """
-    Ruin and recreate: better routes (lists of stops) and the iterations made. Task t has the kind 0 = delivery (stops t and n + t), 1 = visit, 2 = aboard (its delivery is stop t). cost (modes, n, n) [m] symmetric; negative seconds or iterations do not limit.
+    Ruin and recreate: better routes (lists of stops) and the iterations made. Task t has the kind 0 = delivery (stops t and n + t), 1 = visit, 2 = aboard (its delivery is stop t). A robot is given `most` tasks at most, those aboard not counted. cost (modes, n, n) [m] symmetric; negative seconds or iterations do not limit.
+    """
+
+def solve_exact(cost: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], first: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], last: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], visit: Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C', device='cpu', writable=False)], service: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], able: Annotated[NDArray[numpy.uint8], dict(shape=(None, None), order='C', device='cpu', writable=False)], mode: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], start: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], capacity: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], most: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], speed: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], makespan_weight: float, skip: int, upper: float, seconds: float, states: int) -> tuple[list[list[int]], float, float, bool, int]:
+    """
+    Least sum of lengths + makespan_weight * makespan, by bounded dynamic programming.
+
+    Parameters
+    ----------
+    cost
+        (M, L, L) travel cost [m] per mode, row = from; inf = unreachable.
+    first, last, visit, service
+        (n,) locations of the tasks' stops; 1 = has only the first and loads nothing; time at each [s].
+    able
+        (n, R) which robot may serve which task.
+    mode, start, capacity, most, speed
+        (R,) cost matrix, location, tasks carried at once, tasks in all, [m/s]. Robots are filled in
+        this order: the answer does not depend on it, the time does.
+    makespan_weight
+        [m/s].
+    skip
+        Serve exactly n - skip tasks.
+    upper
+        Only objectives below this one [m] are looked for; inf if none is known.
+    seconds, states
+        Limits of time and memory (24 bytes a state, 40 with a makespan; tables take up to twice that
+        again).
+
+    Returns
+    -------
+    routes
+        Per robot its stops: t is task t's first, n + t its last. Empty if there is nothing below
+        `upper`, or nothing was found within the limits.
+    value
+        Their objective [m]; inf without routes.
+    lower
+        No objective is below this one [m]; at most `upper`.
+    complete
+        Whether the search ended before its limits: `value`, or else `upper`, is then the optimum. Above
+        32 tasks or 1000 robots there is only `lower`.
+    states
+        States kept.
+
+    Raises
+    ------
+    ValueError
+        A location or mode outside of `cost`, a negative or NaN cost, shapes that disagree.
     """
 
 def select_tasks(cost: numpy.typing.NDArray[numpy.float64], start: int, first: numpy.typing.NDArray[numpy.int32], last: numpy.typing.NDArray[numpy.int32], visit: numpy.typing.NDArray[numpy.bool_], take: int, capacity: int, work: int = 3500000) -> tuple[numpy.typing.NDArray[numpy.int32], float, bool]:

@@ -10,20 +10,27 @@ import os
 import re
 import sys
 from collections.abc import Callable
-from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from oath import DEFAULT_ALLOCATOR
 from oath.errors import OathError
+from oath.terminal import (
+    counting,
+    print_json,
+    print_plan,
+    print_summary,
+    progress,
+    recording,
+    write,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from oath.events import AnyEvent
     from oath.model import Mission
+    from oath.scene import Assigned
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
@@ -84,8 +91,14 @@ def _allocator_option(command: Callable[..., None]) -> Callable[..., None]:
     )(command)
 
 
-def _print_json(value: object) -> None:
-    click.echo(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
+def _weight_option(command: Callable[..., None]) -> Callable[..., None]:
+    # None tells an allocator that weighs nothing from one that was asked to.
+    return click.option(
+        "--makespan-weight",
+        type=click.FloatRange(min=0.0),
+        help="Weight of the makespan beside the sum of lengths [m/s], for allocators that minimise "
+        "both.  [default: 1]",
+    )(command)
 
 
 @click.group(cls=Program, context_settings=CONTEXT)
@@ -102,6 +115,7 @@ def main() -> None:
 )
 @_mission_argument
 @_allocator_option
+@_weight_option
 @_seed_option
 @_points_option(1000)
 @click.option(
@@ -111,23 +125,36 @@ def main() -> None:
 )
 @_json_option
 def run(
-    mission: Path, allocator: str, seed: int, points: int, out: Path | None, as_json: bool
+    mission: Path,
+    allocator: str,
+    makespan_weight: float | None,
+    seed: int,
+    points: int,
+    out: Path | None,
+    as_json: bool,
 ) -> None:
     """Run a mission in the built-in simulator, to its last delivery."""
     import oath
 
     loaded = oath.load(mission)
-    with _recording(out, loaded) as journal, _progress(len(loaded.tasks)) as show:
+    with recording(out, loaded) as journal, progress(len(loaded.tasks)) as show:
 
         def on_event(event: AnyEvent) -> None:
             journal(event)
             show(event)
 
-        result = oath.run(loaded, allocator=allocator, seed=seed, points=points, on_event=on_event)
+        result = oath.run(
+            loaded,
+            allocator=allocator,
+            makespan_weight=makespan_weight,
+            seed=seed,
+            points=points,
+            on_event=on_event,
+        )
     if out is not None:
         from oath.picture import draw_run
 
-        _write(out / "summary.json", json.dumps(result.summary, indent=2) + "\n")
+        write(out / "summary.json", json.dumps(result.summary, indent=2) + "\n")
         roadmap = result.scene.world.roadmap
         draw_run(
             loaded,
@@ -137,106 +164,11 @@ def run(
             edges=roadmap.edges(),
         )
     if as_json:
-        _print_json(result.summary)
+        print_json(result.summary)
     else:
-        _print_summary(result.summary, out)
+        print_summary(result.summary, out)
     if result.summary["unserved"]:
         raise click.exceptions.Exit(1)
-
-
-def _write(path: Path, text: str) -> None:
-    """Write a whole file or leave the old one."""
-    draft = path.with_name(path.name + ".part")
-    draft.write_text(text, encoding="utf-8")
-    draft.replace(path)
-
-
-@contextmanager
-def _recording(out: Path | None, mission: Mission) -> Iterator[Callable[[AnyEvent], None]]:
-    """Journal every event to events.jsonl, line by line: a run cut off leaves whole lines."""
-    if out is None:
-        yield lambda event: None
-        return
-    from oath.formats.event_log import to_line
-
-    draft = out / "events.jsonl.part"
-    file: IO[str] | None = None
-    count = 0
-
-    def write(event: AnyEvent) -> None:
-        nonlocal file, count
-        if file is None:  # only now: bad input must leave nothing behind
-            out.mkdir(parents=True, exist_ok=True)
-            file = draft.open("w", encoding="utf-8")
-        file.write(to_line(count, event).rstrip("\n") + "\n")
-        count += 1
-
-    try:
-        yield write
-    finally:
-        if file is not None:
-            file.close()
-    draft.replace(out / "events.jsonl")
-
-
-@contextmanager
-def _progress(tasks: int) -> Iterator[Callable[[AnyEvent], None]]:
-    """Show tasks done, the mission clock and the time left, on a terminal only."""
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    from oath.events import StopServed
-
-    console = Console(stderr=True)
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("tasks  mission clock {task.fields[clock]:.0f} s  left"),
-        TimeRemainingColumn(),
-        console=console,
-        disable=not console.is_terminal,
-        transient=True,
-    )
-    with bar:
-        job = bar.add_task("running", total=tasks, clock=0.0)
-
-        def show(event: AnyEvent) -> None:
-            done = isinstance(event, StopServed) and event.stop != "pickup"
-            bar.update(job, advance=int(done), clock=event.t)
-
-        yield show
-
-
-def _print_summary(summary: dict[str, Any], out: Path | None) -> None:
-    click.echo(
-        f"{summary['mission']}: {summary['completed']} of {summary['tasks']} tasks done by "
-        f"{summary['robots']} robots (allocator {summary['allocator']}, seed {summary['seed']})"
-    )
-    click.echo(
-        f"  driven {summary['total_distance']:.1f} m in {summary['total_steps']} steps, "
-        f"makespan {summary['makespan']:.1f} s"
-    )
-    click.echo(
-        f"  {summary['rounds']} rounds in {summary['allocation_seconds'] * 1e3:.0f} ms, "
-        f"{summary['replans']} replans, planning {summary['planning_seconds'] * 1e3:.0f} ms"
-    )
-    width = max(map(len, summary["per_robot"]))
-    for robot, numbers in summary["per_robot"].items():
-        click.echo(
-            f"  {robot:{width}}  {numbers['tasks']:3d} tasks  {numbers['distance']:7.1f} m"
-            f"  {numbers['steps']:4d} steps"
-        )
-    for task, reason in summary["unserved"].items():
-        click.echo(f"  not done: {task}: {reason}")
-    if out is not None:
-        click.echo(f"  see {out / 'routes.png'}, {out / 'summary.json'}, {out / 'events.jsonl'}")
 
 
 def _seconds(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
@@ -251,17 +183,27 @@ def _seconds(ctx: click.Context, param: click.Parameter, value: str | None) -> f
 
 @main.command(
     epilog=_examples(
-        "oath plan missions/maze-25.yaml", "oath plan missions/maze-25.yaml --budget 200ms --json"
+        "oath plan missions/maze-25.yaml --allocator lns --budget 200ms --json",
+        "oath plan missions/maze-15.yaml --allocator exact --makespan-weight 0 --max-tasks 5",
     )
 )
 @_mission_argument
 @_allocator_option
+@_weight_option
+@click.option("--max-tasks", type=click.IntRange(min=1), help="Tasks per robot in all.")
 @click.option("--budget", callback=_seconds, help="Time to improve the answer: 200ms, 1.5s.")
 @_seed_option
 @_points_option(2000)
 @_json_option
 def plan(
-    mission: Path, allocator: str, budget: float | None, seed: int, points: int, as_json: bool
+    mission: Path,
+    allocator: str,
+    makespan_weight: float | None,
+    max_tasks: int | None,
+    budget: float | None,
+    seed: int,
+    points: int,
+    as_json: bool,
 ) -> None:
     """Assign all tasks once, without executing anything."""
     import oath
@@ -270,25 +212,38 @@ def plan(
     from oath.scene import assign, prepare, require_reachable
     from oath.world.roadmap import Params
 
-    loaded, chosen = oath.load(mission), named(allocator)
+    loaded, chosen = oath.load(mission), named(allocator, makespan_weight=makespan_weight)
     scene = prepare(loaded, Params(points=points), seed)
     require_reachable(scene)
-    assigned = assign(scene, chosen, Budget(seconds=budget), seed)
+    assigned = assign(scene, chosen, Budget(seconds=budget), seed, max_tasks)
+    weight = 1.0 if makespan_weight is None else makespan_weight
+    report = _plan_report(loaded, allocator, assigned, weight)
+    if as_json:
+        print_json(report)
+    else:
+        print_plan(report)
+    if report["unassigned"]:
+        raise click.exceptions.Exit(1)
+
+
+def _plan_report(
+    mission: Mission, allocator: str, assigned: Assigned, makespan_weight: float
+) -> dict[str, Any]:
     assignment = assigned.assignment
-    report = {
+    return {
         "allocator": allocator,
         "seconds": assigned.seconds,
         "total_distance": assigned.total_distance,
         "makespan": assigned.makespan,
-        "objective": assigned.total_distance + assigned.makespan,
-        "lower_bound": None,
-        "optimal": False,
+        "objective": assigned.total_distance + makespan_weight * assigned.makespan,
+        "lower_bound": assignment.lower_bound,
+        "optimal": assignment.optimal,
         "routes": {
             robot: [
                 {
                     "task": entry.task,
                     "stop": entry.stop,
-                    "at": list(loaded.task(entry.task).stop(entry.stop).at),
+                    "at": list(mission.task(entry.task).stop(entry.stop).at),
                 }
                 for entry in route
             ]
@@ -296,26 +251,6 @@ def plan(
         },
         "unassigned": dict(assignment.unassigned),
     }
-    if as_json:
-        _print_json(report)
-    else:
-        _print_plan(report)
-    if assignment.unassigned:
-        raise click.exceptions.Exit(1)
-
-
-def _print_plan(report: dict[str, Any]) -> None:
-    click.echo(
-        f"{report['allocator']}: {report['total_distance']:.1f} m in all, makespan "
-        f"{report['makespan']:.1f} s, found in {report['seconds'] * 1e3:.1f} ms"
-    )
-    signs = {"pickup": "+", "delivery": "-", "visit": ""}
-    for robot, route in report["routes"].items():
-        stops = " ".join(signs[entry["stop"]] + entry["task"] for entry in route)
-        click.echo(f"  {robot}: {stops or 'idle'}")
-    for task, reason in report["unassigned"].items():
-        click.echo(f"  unassigned: {task}: {reason}")
-    click.echo("  (+ picks up, - delivers)")
 
 
 @main.command(epilog=_examples("oath check missions/office.yaml"))
@@ -333,7 +268,7 @@ def check(mission: Path, seed: int, points: int, as_json: bool) -> None:
     faults = [f"task '{task}': {why}" for task, why in unreachable(scene).items()]
     warnings = lint(scene)
     if as_json:
-        _print_json({"mission": scene.mission.name, "errors": faults, "warnings": warnings})
+        print_json({"mission": scene.mission.name, "errors": faults, "warnings": warnings})
     else:
         for kind, lines in (("error", faults), ("warning", warnings)):
             for line in lines:
@@ -383,7 +318,7 @@ def map_(mission: Path, seed: int, points: int, png: Path | None, as_json: bool)
 
         draw_map(scene.mission, roadmap.nodes(), roadmap.edges(), png)
     if as_json:
-        _print_json(report)
+        print_json(report)
     else:
         click.echo(
             f"{scene.mission.name}: {report['points']} points, {report['nodes']} nodes, "
@@ -410,7 +345,7 @@ def verify(mission: Path, events: Path, as_json: bool) -> None:
     log = [event for _, event in read(events, places=loaded.places)]
     verdict = judge(loaded, log)
     if as_json:
-        _print_json(
+        print_json(
             {
                 "ok": verdict.ok,
                 "checked": dict(verdict.checked),
@@ -462,7 +397,7 @@ def bench(study: str, quick: bool, seeds: int, out: Path) -> None:
     chosen = [studies.study(name) for name in names]
     outcomes = []
     for one in chosen:
-        with _counting(one.title) as show:
+        with counting(one.title) as show:
             folder = out / ("quick" if quick else f"seeds-{seeds}")
             outcome = studies.run_study(one, folder, quick=quick, seeds=seeds, on_progress=show)
         outcomes.append(outcome)
@@ -472,18 +407,6 @@ def bench(study: str, quick: bool, seeds: int, out: Path) -> None:
         command = "oath bench all" + (" --quick" if quick else f" --seeds {seeds}")
         studies.report(outcomes, folder / "report.md", command=command)
         click.echo(f"see {folder / 'report.md'}")
-
-
-@contextmanager
-def _counting(title: str) -> Iterator[Callable[[int, int], None]]:
-    """Show how many cases are done, and the time left, on a terminal only."""
-    from rich.console import Console
-    from rich.progress import Progress
-
-    console = Console(stderr=True)
-    with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
-        job = bar.add_task(title, total=None)
-        yield lambda done, total: bar.update(job, completed=done, total=total)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
 
@@ -216,10 +216,21 @@ class Assigned:
     makespan: float
 
 
-def assign(scene: Scene, allocator: Allocator, budget: Budget, seed: int) -> Assigned:
-    """Assign all tasks of a mission at once, without executing anything."""
+def assign(
+    scene: Scene, allocator: Allocator, budget: Budget, seed: int, max_tasks: int | None = None
+) -> Assigned:
+    """Assign all tasks of a mission at once, without executing anything.
+
+    Parameters
+    ----------
+    max_tasks
+        Tasks that a robot may be given in all; None = any number.
+    """
     begin = time.perf_counter()
     problem = pose(scene, State.of(scene.mission))
+    if max_tasks is not None:
+        most = np.minimum(problem.max_tasks, max_tasks)
+        problem = replace(problem, max_tasks=most.astype(np.int32))
     rng = np.random.default_rng(seed)
     assignment = plan_all(problem, ByPriority(allocator), budget, rng)
     seconds = time.perf_counter() - begin

@@ -6,10 +6,13 @@ paper's three stages are `clustering`, `auction` and `selection`; `Oath` puts th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from oath.allocate.cbba import Cbba
 from oath.allocate.contract import Allocator, Budget, checked, reasons
+from oath.allocate.exact import Exact
 from oath.allocate.greedy import Greedy
 from oath.allocate.kam import Kam
 from oath.allocate.kan import Kan
@@ -27,6 +30,7 @@ __all__ = [
     "Budget",
     "ByPriority",
     "Cbba",
+    "Exact",
     "Greedy",
     "Kam",
     "Kan",
@@ -43,6 +47,7 @@ __all__ = [
 
 ALLOCATORS: dict[str, Callable[[], Allocator]] = {
     "lns": Lns,
+    "exact": Exact,
     "oath": Oath,
     "kam": Kam,
     "kan": Kan,
@@ -52,13 +57,18 @@ ALLOCATORS: dict[str, Callable[[], Allocator]] = {
 """Every allocator by its name, with its default parameters."""
 
 
-def allocator(name: str) -> Allocator:
+def allocator(name: str, *, makespan_weight: float | None = None) -> Allocator:
     """Return a new allocator by its name.
+
+    Parameters
+    ----------
+    makespan_weight
+        Weight of the makespan in what it minimises [m/s]; None = its default.
 
     Raises
     ------
     BadInput
-        Nobody has this name.
+        Nobody has this name, a weight for an allocator that weighs nothing, or a negative one.
 
     Examples
     --------
@@ -70,4 +80,15 @@ def allocator(name: str) -> Allocator:
     """
     if name not in ALLOCATORS:
         raise BadInput(f"unknown allocator '{name}'", remedy=did_you_mean(name, list(ALLOCATORS)))
-    return ALLOCATORS[name]()
+    chosen = ALLOCATORS[name]()
+    if makespan_weight is None:
+        return chosen
+    if not 0 <= makespan_weight < math.inf:
+        raise BadInput(f"makespan weight {makespan_weight:g} is not a finite number from 0 up")
+    if isinstance(chosen, Exact):
+        return Exact(replace(chosen.params, makespan_weight=makespan_weight))
+    if isinstance(chosen, Lns):
+        return Lns(replace(chosen.params, makespan_weight=makespan_weight))
+    raise BadInput(
+        f"allocator '{name}' has no makespan weight", remedy="use 'lns' or 'exact', or drop it"
+    )

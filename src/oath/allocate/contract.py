@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -56,6 +56,13 @@ def stop_location(problem: Problem, task: int, stop: str) -> int:
     return int(problem.delivery[task] if stop == "delivery" else problem.pickup[task])
 
 
+def with_routes(problem: Problem, routes: Sequence[Route]) -> Problem:
+    """Return the problem with `max_tasks` lower by what new routes, one per robot, give."""
+    given = [len({stop.task for stop in route}) for route in routes]
+    most = np.maximum(problem.max_tasks - np.array(given, dtype=np.int32), 0)
+    return replace(problem, max_tasks=most.astype(np.int32))
+
+
 def reasons(problem: Problem, tasks: Iterable[int]) -> dict[str, str]:
     """Say why tasks are in no route: the first condition that no robot meets, else `WAITING`.
 
@@ -87,6 +94,9 @@ def _why_not(problem: Problem, task: int) -> str:
     able = able[(problem.capacity[able] > 0) | problem.visit[task]]
     if not able.size:
         return "no room: the robots that could take it are full"
+    able = able[problem.max_tasks[able] > 0]
+    if not able.size:
+        return "every robot that could take it has as many tasks as it may be given (max_tasks)"
     return "every robot that could take it would break a rule"
 
 
@@ -100,8 +110,8 @@ def checked(
     ProviderError
         A robot without a route, an unknown robot, task or stop; a task lost, doubled, or both
         assigned and not; a last stop before the first; a load above capacity; a robot that cannot
-        do the type or reach a stop; a carried task dropped or moved. A route that is the same as
-        before is taken as it is.
+        do the type or reach a stop; more new tasks than `max_tasks`; a carried task dropped or
+        moved. A route that is the same as before is taken as it is.
     """
     answer = allocator.allocate(problem, budget, rng)
     _Check(problem, type(allocator).__name__).assignment(answer)
@@ -125,6 +135,7 @@ class _Check:
             self._carried(r, route)
             if route != self.problem.routes[r]:
                 self._route(r, route)
+                self._count(r, route)
         self._tasks(answer)
 
     def _tasks(self, answer: Assignment) -> None:
@@ -181,6 +192,14 @@ class _Check:
             if not np.isfinite(cost[at, there]):
                 self.fail(f"robot '{robot}' cannot reach the {stop.stop} of task '{stop.task}'")
             at = there
+
+    def _count(self, r: int, route: Route) -> None:
+        before = {stop.task for stop in self.problem.routes[r]}
+        before |= {load.task for load in self.problem.aboard[r]}
+        new = len({stop.task for stop in route} - before)
+        most = self.problem.max_tasks[r]
+        if new > most:
+            self.fail(f"robot '{self.problem.robots[r]}' is given {new} tasks, its limit is {most}")
 
 
 def to_route(problem: Problem, picks: Iterable[tuple[int, StopName]]) -> Route:

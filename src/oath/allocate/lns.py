@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oath import _core
-from oath.allocate.contract import Budget, reasons
+from oath.allocate.contract import Budget, reasons, with_routes
 from oath.allocate.oath import in_no_route
 from oath.allocate.problem import Problem
 from oath.allocate.rounds import follow
@@ -47,57 +47,64 @@ class Lns:
 
         Routes under way change only if that saves `switch_gain` of the objective, or serves more.
         """
-        stops = _Stops(problem)
+        stops = Stops(problem)
         before = stops.kept(problem.previous)
-        seed = int(rng.integers(2**63))
-        steady = self._search(stops, before, seed, 0.0, 0)
-        seconds, iterations = budget.seconds, budget.iterations
-        if seconds is None and iterations is None:
-            iterations = self.params.iterations
-        found = self._search(stops, before, seed, seconds, iterations)
-        chosen = found
+        weight, seed = self.params.makespan_weight, int(rng.integers(2**63))
+        if budget.seconds is None and budget.iterations is None:
+            budget = Budget(iterations=self.params.iterations)
+        chosen = search(stops, before, weight, budget, seed)
         if any(before):
-            old, new = (stops.value(r, self.params.makespan_weight) for r in (steady, found))
+            steady = search(stops, before, weight, Budget(iterations=0), seed)
+            old, new = stops.value(steady, weight), stops.value(chosen, weight)
             if old[0] == new[0] and new[1] > old[1] * (1 - self.params.switch_gain):
                 chosen = steady
-        routes = stops.routes(chosen)
-        done = {stop.task for route in routes.values() for stop in route}
-        left = [p for p, task in enumerate(problem.tasks) if task not in done]
-        return Assignment(routes=routes, unassigned=reasons(problem, left))
-
-    def _search(
-        self,
-        stops: _Stops,
-        routes: Routes,
-        seed: int,
-        seconds: float | None,
-        iterations: int | None,
-    ) -> Routes:
-        problem = stops.problem
-        answer, _ = _core.search(
-            cost=np.ascontiguousarray(problem.cost),
-            first=stops.first,
-            last=stops.last,
-            kind=stops.kind,
-            owner=stops.owner,
-            service=stops.service,
-            able=stops.able,
-            mode=problem.mode,
-            start=problem.start,
-            capacity=problem.capacity,
-            aboard=np.array([len(loads) for loads in problem.aboard], dtype=np.int32),
-            speed=problem.speed,
-            ready=problem.ready,
-            makespan_weight=self.params.makespan_weight,
-            routes=routes,
-            seed=seed,
-            seconds=-1.0 if seconds is None else seconds,
-            iterations=-1 if iterations is None else iterations,
-        )
-        return answer
+        return stops.assignment(chosen)
 
 
-class _Stops:
+def search(
+    stops: Stops, routes: Routes, makespan_weight: float, budget: Budget, seed: int
+) -> Routes:
+    """Improve routes, and take up what is in none.
+
+    Parameters
+    ----------
+    routes
+        Where to begin; [] for every robot begins with a greedy construction.
+    makespan_weight
+        Weight of the makespan in the objective [m/s].
+
+    Returns
+    -------
+    Routes
+        As few tasks as possible are missing. Costs must be symmetric, otherwise a leg may be
+        infinite.
+    """
+    problem = stops.problem
+    answer, _ = _core.search(
+        cost=np.ascontiguousarray(problem.cost),
+        first=stops.first,
+        last=stops.last,
+        kind=stops.kind,
+        owner=stops.owner,
+        service=stops.service,
+        able=stops.able,
+        mode=problem.mode,
+        start=problem.start,
+        capacity=problem.capacity,
+        aboard=np.array([len(loads) for loads in problem.aboard], dtype=np.int32),
+        most=problem.max_tasks,
+        speed=problem.speed,
+        ready=problem.ready,
+        makespan_weight=makespan_weight,
+        routes=routes,
+        seed=seed,
+        seconds=-1.0 if budget.seconds is None else budget.seconds,
+        iterations=-1 if budget.iterations is None else budget.iterations,
+    )
+    return answer
+
+
+class Stops:
     """The stops to be routed, as the core numbers them: open tasks first, then what is aboard."""
 
     def __init__(self, problem: Problem) -> None:
@@ -130,17 +137,29 @@ class _Stops:
             kept.append([self._code(number[stop.task], stop.stop) for stop in rest])
         return kept
 
+    def sound(self, routes: Routes) -> Routes:
+        """Leave out routes with a leg that does not exist: the search takes costs for symmetric."""
+        lengths = [follow(self.problem, r, route)[0] for r, route in enumerate(self.new(routes))]
+        return [
+            route if np.isfinite(length) else []
+            for route, length in zip(routes, lengths, strict=True)
+        ]
+
     def _code(self, task: int, stop: StopName) -> int:
         is_last = stop == "delivery" and self.kind[task] == 0
         return task + len(self.ids) if is_last else task
 
-    def routes(self, routes: Routes) -> dict[str, Route]:
-        """Every robot's whole route: what is fixed, then these stops."""
-        problem = self.problem
-        return {
-            robot: problem.routes[r] + tuple(self._stop(code) for code in routes[r])
-            for r, robot in enumerate(problem.robots)
-        }
+    def new(self, routes: Routes) -> list[Route]:
+        """Every robot's stops after what is fixed."""
+        return [tuple(self._stop(code) for code in route) for route in routes]
+
+    def assignment(self, routes: Routes) -> Assignment:
+        """Put these stops behind what is fixed; say why the other tasks are in no route."""
+        problem, new = self.problem, self.new(routes)
+        whole = {robot: problem.routes[r] + new[r] for r, robot in enumerate(problem.robots)}
+        done = {stop.task for route in whole.values() for stop in route}
+        left = [p for p, task in enumerate(problem.tasks) if task not in done]
+        return Assignment(routes=whole, unassigned=reasons(with_routes(problem, new), left))
 
     def _stop(self, code: int) -> RouteStop:
         n = len(self.ids)
@@ -149,10 +168,9 @@ class _Stops:
         return RouteStop(task=self.ids[code % n], stop=name)
 
     def value(self, routes: Routes, makespan_weight: float) -> tuple[int, float]:
-        """Stops served, and the objective [m]."""
+        """Stops served, and the objective: lengths [m] + weight [m/s] * makespan [s]."""
         problem, total, times = self.problem, 0.0, [0.0]
-        for r, robot in enumerate(problem.robots):
-            rest = self.routes(routes)[robot][len(problem.routes[r]) :]
+        for r, rest in enumerate(self.new(routes)):
             length, service, _ = follow(problem, r, rest)
             total += length
             times.append(float(problem.ready[r] + length / problem.speed[r] + service))

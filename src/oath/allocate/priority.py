@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from oath.allocate.contract import Allocator, Budget, reasons
+from oath.allocate.contract import Allocator, Budget, reasons, with_routes
 from oath.allocate.problem import WAITING, Problem
 from oath.allocate.rounds import follow, urgent
 from oath.model import Assignment, Route
@@ -32,6 +32,8 @@ class ByPriority:
     def allocate(self, problem: Problem, budget: Budget, rng: np.random.Generator) -> Assignment:
         """Give routes to robots, see `Allocator`."""
         rest = problem
+        proof = Assignment(routes={}, unassigned={})
+        alone = len(set(problem.priority.tolist())) == 1
         for lowest in (1, 0, -1):
             taken = {stop.task for route in rest.routes for stop in route}
             chosen = [
@@ -48,20 +50,24 @@ class ByPriority:
                 busy=rest.busy,
                 routes=rest.routes,
                 aboard=rest.aboard,
+                max_tasks=rest.max_tasks,
             )
             if lowest == 1:
                 first = urgent(part, list(range(len(chosen))))
                 new = {robot: old + first.routes[robot] for robot, old in _by_robot(rest)}
             else:
-                new = dict(self.inner.allocate(part, budget, rng).routes)
+                answer = self.inner.allocate(part, budget, rng)
+                new = dict(answer.routes)
+                proof = answer if alone else proof
             rest = _after(rest, new)
             done = {stop.task for route in rest.routes for stop in route}
             left = [p for p in chosen if problem.tasks[p] not in done]
-            if lowest < 1 and WAITING in reasons(problem, left).values():
+            if lowest < 1 and WAITING in reasons(_bare(problem, rest), left).values():
                 break
         done = {stop.task for route in rest.routes for stop in route}
         left = [p for p, task in enumerate(problem.tasks) if task not in done]
-        return Assignment(routes=dict(_by_robot(rest)), unassigned=reasons(problem, left))
+        why = reasons(_bare(problem, rest), left)
+        return replace(proof, routes=dict(_by_robot(rest)), unassigned=why)
 
 
 def _by_robot(problem: Problem) -> list[tuple[str, Route]]:
@@ -71,9 +77,11 @@ def _by_robot(problem: Problem) -> list[tuple[str, Route]]:
 def _after(problem: Problem, routes: Mapping[str, Route]) -> Problem:
     """The problem once these routes are fixed: robots are free where and when they end."""
     start, ready, busy = problem.start.copy(), problem.ready.copy(), problem.busy.copy()
-    aboard = list(problem.aboard)
+    aboard, given = list(problem.aboard), []
     for r, (robot, old) in enumerate(_by_robot(problem)):
         new = routes[robot][len(old) :]
+        loaded = {load.task for load in aboard[r]}
+        given.append(tuple(stop for stop in new if stop.task not in loaded))
         if not new:
             continue
         length, service, start[r] = follow(problem, r, new)
@@ -82,4 +90,10 @@ def _after(problem: Problem, routes: Mapping[str, Route]) -> Problem:
         delivered = {stop.task for stop in new}
         aboard[r] = tuple(load for load in aboard[r] if load.task not in delivered)
     fixed = tuple(routes[robot] for robot in problem.robots)
-    return replace(problem, start=start, ready=ready, busy=busy, routes=fixed, aboard=tuple(aboard))
+    rest = replace(problem, start=start, ready=ready, busy=busy, routes=fixed, aboard=tuple(aboard))
+    return with_routes(rest, given)
+
+
+def _bare(problem: Problem, rest: Problem) -> Problem:
+    """The problem as it was, but for how many tasks robots may still be given."""
+    return replace(problem, max_tasks=rest.max_tasks)

@@ -83,12 +83,15 @@ class Problem:
     """(R,) what each robot was to do before this round; begins with `routes`."""
 
     def feasible(self) -> NDArray[np.bool_]:
-        """(R, P): the robot can do the type, has room, reaches pickup and from there delivery."""
+        """(R, P): the robot can do the type, has room, reaches pickup and from there delivery.
+
+        A robot that may be given no task at all can do none.
+        """
         there = np.isfinite(self.cost[self.mode[:, None], self.start[:, None], self.pickup])
         on = np.isfinite(self.cost[:, self.pickup, self.delivery])[self.mode]
         room = (self.capacity[:, None] > 0) | self.visit
         able: NDArray[np.bool_] = there & on & room & (self.capability[:, self.type] > 0)
-        return able & ~self.refused
+        return able & ~self.refused & (self.max_tasks[:, None] > 0)
 
     def only(self, tasks: Sequence[int]) -> Problem:
         """The same problem with some of its tasks only."""

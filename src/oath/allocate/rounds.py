@@ -15,6 +15,7 @@ from oath.allocate.contract import (
     stop_location,
     stop_names,
     to_route,
+    with_routes,
 )
 from oath.allocate.problem import Problem
 from oath.model import Assignment, Route, RouteStop
@@ -55,7 +56,7 @@ def plan_all(
     -------
     Assignment
         The concatenated routes. A task stays unassigned only if no robot that was idle at the start
-        can do it.
+        can do it, or may be given one more. What the allocator proves stands if one round did all.
 
     Raises
     ------
@@ -69,6 +70,7 @@ def plan_all(
     left = [i for i, task in enumerate(problem.tasks) if task not in kept]
     total: list[list[RouteStop]] = [list(route) for route in problem.routes]
     latest: list[Route] = list(problem.routes)
+    proof, waiting = Assignment(routes={}, unassigned={}), len(left)
     clock = 0.0
     while left:
         busy = fleet.time > clock
@@ -76,6 +78,11 @@ def plan_all(
         latest = [route if on else () for route, on in zip(latest, busy, strict=True)]
         answer = checked(allocator, _rest(problem, left, fleet, busy, latest), budget, rng)
         new = [_new(answer.routes[robot], index, left) for robot in problem.robots]
+        if len(left) == waiting:
+            proof = answer
+        elif any(new):
+            proof = replace(proof, lower_bound=None, optimal=False)
+        problem = with_routes(problem, new)
         for robot, route in enumerate(new):
             for stop in route:
                 fleet.serve(robot, index[stop.task], stop.stop)
@@ -91,7 +98,7 @@ def plan_all(
         elif not taken:
             break  # everyone is idle, and nobody can do what is left
     routes = {robot: tuple(total[r]) for r, robot in enumerate(problem.robots)}
-    return Assignment(routes=routes, unassigned=reasons(problem, left))
+    return replace(proof, routes=routes, unassigned=reasons(problem, left))
 
 
 def _rest(
@@ -128,7 +135,9 @@ def urgent(problem: Problem, tasks: list[int]) -> Assignment:
     able = problem.feasible() & (~full[:, None] | problem.visit)
     routes: dict[str, Route] = dict.fromkeys(problem.robots, ())
     missed = []
+    given = np.zeros(len(problem.robots), dtype=np.int32)
     for task in sorted(tasks):
+        able[given >= problem.max_tasks] = False
         pickup, delivery = problem.pickup[task], problem.delivery[task]
         to_pickup = problem.cost[problem.mode, fleet.at, pickup]
         on = problem.cost[problem.mode, pickup, delivery] * (not problem.visit[task])
@@ -140,8 +149,10 @@ def urgent(problem: Problem, tasks: list[int]) -> Assignment:
         names = stop_names(problem, task)
         for name in names:
             fleet.serve(robot, task, name)
+        given[robot] += 1
         routes[problem.robots[robot]] += to_route(problem, [(task, name) for name in names])
-    return Assignment(routes=routes, unassigned=reasons(problem, missed))
+    left = replace(problem, max_tasks=problem.max_tasks - given)
+    return Assignment(routes=routes, unassigned=reasons(left, missed))
 
 
 def follow(problem: Problem, robot: int, stops: Route) -> tuple[float, float, int]:

@@ -40,9 +40,9 @@ def select(
 ) -> Picks:
     """Choose min(Q, compatible) tasks and the shortest order of their stops.
 
-    The path is open and begins where the robot is free. Q is the robot's capacity; one without
-    room still takes one visit, which loads nothing. If costs are so one-sided that no path serves
-    that many, one less is tried.
+    The path is open and begins where the robot is free. Q is the robot's capacity, or `max_tasks`
+    if that is less; one without room still takes one visit, which loads nothing. If costs are so
+    one-sided that no path serves that many, one less is tried.
 
     Parameters
     ----------
@@ -65,7 +65,8 @@ def select(
     """
     feasible = problem.feasible()[robot]
     tasks = np.array([task for task in candidates if feasible[task]], dtype=np.intp)
-    take = min(max(1, int(problem.capacity[robot])), len(tasks), CORE_LIMIT)
+    most = min(max(1, int(problem.capacity[robot])), int(problem.max_tasks[robot]))
+    take = min(most, len(tasks), CORE_LIMIT)
     if method == "dp":
         limit = CORE_LIMIT if take <= FEW else max(take, CANDIDATES)
         tasks = nearest(problem, robot, tasks, limit)
