@@ -499,7 +499,7 @@ def test_a_run_with_a_stranded_task_rebuilds_its_state() -> None:
     )
     # Blind until it touches the gate: it has picked a up by then.
     mission = replace(mission, robots=(replace(mission.robots[0], sensing=0.5),))
-    state = check_replay(mission, points=200)
+    state = check_replay(mission, points=200, allocator="oath")
     assert state.stranded.keys() == {"a"}
     assert state.completed == {"b"}
     assert state.unserved()["c"] == "no room: the robots that could take it are full"

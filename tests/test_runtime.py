@@ -224,7 +224,7 @@ def test_a_robot_with_room_for_one_carries_one_by_one() -> None:
 
 def test_the_faster_robot_is_not_held_up() -> None:
     robots = [robot("hare", (1, 1), speed=4.0), robot("snail", (1, 9), speed=0.5)]
-    result = all_done(yard(robots, [visit("a", (9, 1)), visit("b", (9, 9))]))
+    result = all_done(yard(robots, [visit("a", (9, 1)), visit("b", (9, 9))]), allocator="oath")
     ends = {stop.robot: stop.t for stop in of(StopServed, result)}
     assert ends == pytest.approx({"hare": 2.0, "snail": 16.0})
 
