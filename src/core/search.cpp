@@ -371,24 +371,26 @@ private:
             // What is aboard takes room up to here.
             if (task.kind == Kind::kAboard && route.load[i] > robot.capacity) break;
             const Length in = first[route.at[i]];
-            if (in >= best.cost || (blink > 0 && random_.unit() < blink)) continue;
+            if (in >= kNoWay || (blink > 0 && random_.unit() < blink)) continue;
+            const Length on = i < n ? first[route.at[i + 1]] : 0;
             if (task.kind != Kind::kDelivery) {
-                const Length c = in + (i < n ? first[route.at[i + 1]] - route.hop[i] : 0);
-                if (c < best.cost) best = {c, r, i, i};
+                const Length c = in + on - route.hop[i];
+                if (c < best.cost && on < kNoWay) best = {c, r, i, i};
                 continue;
             }
             if (route.load[i] >= robot.capacity) continue;
-            const Length direct = first[task.last];
-            const Length c = in + direct + (i < n ? last[route.at[i + 1]] - route.hop[i] : 0);
-            if (c < best.cost) best = {c, r, i, i};
+            const Length direct = first[task.last], after = i < n ? last[route.at[i + 1]] : 0;
+            const Length c = in + direct + after - route.hop[i];
+            if (c < best.cost && direct < kNoWay && after < kNoWay) best = {c, r, i, i};
             if (i == n) break;
-            const Length detour = in + first[route.at[i + 1]] - route.hop[i];
+            // The second stop adds something too, so a detour that is too long already is no use.
+            const Length detour = in + on - route.hop[i];
+            if (on >= kNoWay || detour >= best.cost) continue;
             for (int j = i + 1; j <= n; ++j) {
                 if (route.load[j] >= robot.capacity) break;
-                const Length out = last[route.at[j]];
-                const Length both =
-                    detour + out + (j < n ? last[route.at[j + 1]] - route.hop[j] : 0);
-                if (both < best.cost) best = {both, r, i, j};
+                const Length out = last[route.at[j]], next = j < n ? last[route.at[j + 1]] : 0;
+                const Length both = detour + out + next - route.hop[j];
+                if (both < best.cost && out < kNoWay && next < kNoWay) best = {both, r, i, j};
             }
         }
         return best;

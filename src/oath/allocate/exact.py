@@ -59,7 +59,7 @@ class Exact:
         if not stops.ids:
             return replace(stops.assignment(nothing), lower_bound=0.0, optimal=True)
         share, seed = self._share(budget, len(stops.ids)), int(rng.integers(2**63))
-        known = stops.sound(search(stops, nothing, params.makespan_weight, share, seed))
+        known = search(stops, nothing, params.makespan_weight, share, seed)
         found, lower, optimal = self._prove(stops, known, begin + seconds)
         if params.makespan_weight and problem.ready.any():
             lower, optimal = None, False  # the proof has all robots begin now

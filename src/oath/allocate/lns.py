@@ -76,12 +76,11 @@ def search(
     Returns
     -------
     Routes
-        As few tasks as possible are missing. Costs must be symmetric, otherwise a leg may be
-        infinite.
+        As few tasks as possible are missing. Where costs differ by direction, the greater counts.
     """
     problem = stops.problem
     answer, _ = _core.search(
-        cost=np.ascontiguousarray(problem.cost),
+        cost=np.ascontiguousarray(np.maximum(problem.cost, problem.cost.transpose(0, 2, 1))),
         first=stops.first,
         last=stops.last,
         kind=stops.kind,
@@ -136,14 +135,6 @@ class Stops:
                 rest = ()
             kept.append([self._code(number[stop.task], stop.stop) for stop in rest])
         return kept
-
-    def sound(self, routes: Routes) -> Routes:
-        """Leave out routes with a leg that does not exist: the search takes costs for symmetric."""
-        lengths = [follow(self.problem, r, route)[0] for r, route in enumerate(self.new(routes))]
-        return [
-            route if np.isfinite(length) else []
-            for route, length in zip(routes, lengths, strict=True)
-        ]
 
     def _code(self, task: int, stop: StopName) -> int:
         is_last = stop == "delivery" and self.kind[task] == 0
