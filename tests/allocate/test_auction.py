@@ -101,3 +101,9 @@ def test_scores_are_never_nan(problem: Problem) -> None:
     score = scores(problem, clusters, problem.feasible())
     assert score.shape == (len(problem.robots), len(clusters))
     assert not np.isnan(score).any()
+
+
+def test_half_the_capability_doubles_the_bid() -> None:
+    problem = line([0.0, 0.0], [(5, 6)], capability=[[1.0], [0.5]], types=[0])
+    score = scores(problem, cluster(problem, np.arange(1)), problem.feasible())
+    assert score[1, 0] == 2 * score[0, 0]

@@ -31,11 +31,12 @@ class Outcome:
 def specialisation(problem: Problem, clusters: Sequence[Cluster]) -> NDArray[np.float64]:
     """Return gamma, (R, K): how well a robot suits a cluster.
 
-    gamma[r, k] = sum over types t of share[k, t] * c[r, t], where c are the robot's capabilities
-    scaled to unit sum: one that can do little else is preferred for what it can do.
+    gamma[r, k] = sum over types t of share[k, t] * c[r, t] / n[r], where c are the robot's
+    capabilities and n how many types it can do: one that can do little else is preferred for what
+    it can do, and half the capability doubles the bid.
     """
-    total = problem.capability.sum(axis=1, keepdims=True)
-    scaled = problem.capability / np.where(total > 0, total, 1.0)
+    types = (problem.capability > 0).sum(axis=1, keepdims=True)
+    scaled = problem.capability / np.maximum(types, 1)
     shares = np.array([cluster.share for cluster in clusters]).reshape(-1, scaled.shape[1])
     gamma: NDArray[np.float64] = scaled @ shares.T
     return gamma
