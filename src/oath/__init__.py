@@ -49,6 +49,7 @@ def run(
     *,
     allocator: str = DEFAULT_ALLOCATOR,
     makespan_weight: float | None = None,
+    seconds: float | None = None,
     seed: int = 0,
     points: int = 1000,
     on_event: Callable[[AnyEvent], None] = lambda event: None,
@@ -64,6 +65,9 @@ def run(
     makespan_weight
         Weight of the makespan beside the sum of lengths [m/s], for allocators that minimise it;
         None = their default.
+    seconds
+        Wall clock for improving each answer of the allocator [s]; None = a fixed number of
+        iterations. With a clock, the same seed need not give the same events.
     seed
         Of the roadmap and the allocator: the same seed gives the same events, wall clock aside.
     points
@@ -97,7 +101,7 @@ def run(
         SimFleet(mission),
         name=allocator,
         allocator=chosen,
-        budget=Budget(),
+        budget=Budget(seconds=seconds),
         seed=seed,
         on_event=on_event,
     ).run()

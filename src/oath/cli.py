@@ -101,6 +101,25 @@ def _weight_option(command: Callable[..., None]) -> Callable[..., None]:
     )(command)
 
 
+def _seconds(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
+    """Parse a duration such as 200ms or 1.5s [s]."""
+    if value is None:
+        return None
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*(ms|s)", value)
+    if not match:
+        raise click.BadParameter(f"'{value}' is no duration; write e.g. 200ms or 1.5s")
+    return float(match[1]) * (1e-3 if match[2] == "ms" else 1.0)
+
+
+def _budget_option(command: Callable[..., None]) -> Callable[..., None]:
+    return click.option(
+        "--budget",
+        callback=_seconds,
+        help="Time to improve an answer: 200ms, 1.5s.  [default: a fixed number of iterations, the "
+        "same on every machine]",
+    )(command)
+
+
 @click.group(cls=Program, context_settings=CONTEXT)
 @click.version_option(package_name="oath-fleet", prog_name="oath")
 def main() -> None:
@@ -116,6 +135,7 @@ def main() -> None:
 @_mission_argument
 @_allocator_option
 @_weight_option
+@_budget_option
 @_seed_option
 @_points_option(1000)
 @click.option(
@@ -128,6 +148,7 @@ def run(
     mission: Path,
     allocator: str,
     makespan_weight: float | None,
+    budget: float | None,
     seed: int,
     points: int,
     out: Path | None,
@@ -147,6 +168,7 @@ def run(
             loaded,
             allocator=allocator,
             makespan_weight=makespan_weight,
+            seconds=budget,
             seed=seed,
             points=points,
             on_event=on_event,
@@ -171,16 +193,6 @@ def run(
         raise click.exceptions.Exit(1)
 
 
-def _seconds(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
-    """Parse a duration such as 200ms or 1.5s [s]."""
-    if value is None:
-        return None
-    match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*(ms|s)", value)
-    if not match:
-        raise click.BadParameter(f"'{value}' is no duration; write e.g. 200ms or 1.5s")
-    return float(match[1]) * (1e-3 if match[2] == "ms" else 1.0)
-
-
 @main.command(
     epilog=_examples(
         "oath plan missions/maze-25.yaml --allocator lns --budget 200ms --json",
@@ -191,7 +203,7 @@ def _seconds(ctx: click.Context, param: click.Parameter, value: str | None) -> f
 @_allocator_option
 @_weight_option
 @click.option("--max-tasks", type=click.IntRange(min=1), help="Tasks per robot in all.")
-@click.option("--budget", callback=_seconds, help="Time to improve the answer: 200ms, 1.5s.")
+@_budget_option
 @_seed_option
 @_points_option(2000)
 @_json_option
