@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from math import dist, inf
 from pathlib import Path
@@ -29,12 +30,29 @@ from missions import (
     visit,
     yard,
 )
+from oath.allocate import Budget
+from oath.allocate import allocator as named
 from oath.errors import BadInput
-from oath.events import Allocated, Event, MissionFinished, Moved, ObstacleFound, Planned, StopServed
+from oath.events import (
+    Allocated,
+    AnyEvent,
+    Event,
+    MissionFinished,
+    Moved,
+    ObstacleFound,
+    Planned,
+    RobotFailed,
+    StopServed,
+    TaskAdded,
+)
+from oath.fleet import Order
+from oath.fleet.sim import SimFleet
 from oath.formats.event_log import to_line
 from oath.model import Mission, Motion, Point
-from oath.runtime import Result
+from oath.runtime import Result, Runtime
+from oath.scene import prepare
 from oath.verify import verify
+from oath.world.roadmap import Params
 
 SHIPPED = sorted(Path("missions").glob("*.yaml"))
 SHIPPED = [path for path in SHIPPED if "schema: oath/mission/1" in path.read_text()]
@@ -637,3 +655,67 @@ def test_an_allocation_covers_every_task_once() -> None:
     assert sorted({stop.task for stop in stops}) == sorted(task.id for task in mission.tasks)
     assert len(stops) == sum(len(task.stops) for task in mission.tasks)
     assert assignment.routes.keys() == {one.id for one in mission.robots}
+
+
+# --- What changes while the mission runs
+
+
+class Eventful:
+    """A simulated fleet that also reports other things at given times."""
+
+    def __init__(self, mission: Mission, extra: list[AnyEvent]) -> None:
+        self.sim, self.extra = SimFleet(mission), extra
+
+    def send(self, robot: str, order: Order) -> None:
+        self.sim.send(robot, order)
+
+    def cancel(self, robot: str, *, at_once: bool) -> tuple[float, float]:
+        return self.sim.cancel(robot, at_once=at_once)
+
+    def events(self) -> Sequence[AnyEvent]:
+        due = list(self.sim.events())
+        while self.extra and (not due or due[-1].t >= self.extra[0].t):
+            # The simulator's clock has moved on already: it happens now.
+            now = due[-1].t if due else self.extra[0].t
+            due.append(replace(self.extra.pop(0), t=now))
+        return due
+
+
+def run_with(mission: Mission, allocator: str, *extra: AnyEvent) -> Result:
+    result = Runtime(
+        prepare(mission, Params(points=200)),
+        Eventful(mission, list(extra)),
+        name=allocator,
+        allocator=named(allocator),
+        budget=Budget(iterations=300),
+        seed=0,
+    ).run()
+    verdict = verify(mission, result.events)
+    assert verdict.ok, verdict.violations
+    return result
+
+
+@pytest.mark.parametrize("allocator", ["lns", "oath"])
+def test_a_task_that_arrives_is_done(allocator: str) -> None:
+    robots = [robot("west", (1, 1)), robot("east", (9, 1))]
+    mission = yard(robots, [visit("a", (1, 9)), visit("b", (9, 3)), visit("d", (9, 9))])
+    result = run_with(mission, allocator, TaskAdded(t=1.0, task=visit("c", (9, 6))))
+    assert result.summary["completed"] == result.summary["tasks"] == 4
+    if allocator == "lns":  # its routes are reconsidered: c lies on the way from b to d
+        assert [stop.task for stop in of(StopServed, result, "east")] == ["b", "c", "d"]
+
+
+@pytest.mark.parametrize("allocator", ["lns", "oath"])
+def test_others_take_over_from_a_robot_that_fails(allocator: str) -> None:
+    robots = [robot("r1", (1, 1)), robot("r2", (9, 1))]
+    tasks = [delivery("a", (1, 3), (1, 9)), visit("b", (2, 9)), visit("c", (9, 9))]
+    result = run_with(yard(robots, tasks), allocator, RobotFailed(t=2.5, robot="r1"))
+    assert result.summary["unserved"] == {"a": "carried by r1, which failed"}
+    served = {stop.task: stop.robot for stop in of(StopServed, result) if stop.stop == "visit"}
+    assert served == {"b": "r2", "c": "r2"}
+
+
+def test_when_every_robot_fails_the_mission_ends() -> None:
+    mission = yard([robot("r1", (1, 1))], [visit("a", (9, 9)), visit("b", (9, 1))])
+    result = run_with(mission, "lns", RobotFailed(t=0.5, robot="r1"))
+    assert set(result.summary["unserved"]) == {"a", "b"}

@@ -18,7 +18,9 @@ from oath.events import (
     ObstacleFound,
     Planned,
     PlanReason,
+    RobotFailed,
     StopServed,
+    TaskAdded,
 )
 from oath.model import Mission, Point, Route, RouteStop, Task
 
@@ -48,6 +50,8 @@ class State:
     completed: frozenset[str] = frozenset()
     stranded: Mapping[str, str] = field(default_factory=dict)
     """Carried tasks that cannot be delivered, and why."""
+    failed: frozenset[str] = frozenset()
+    """Robots that are out of the mission."""
     reconsiders: bool = False
     """The allocator may change routes that are under way; else only idle robots get tasks."""
     refused: frozenset[tuple[str, str]] = frozenset()
@@ -161,6 +165,10 @@ def advance(state: State, event: AnyEvent) -> tuple[State, tuple[Action, ...]]:
                 state, more = _allocate(state)
                 actions += more
             return state, actions
+        case TaskAdded():
+            return _allocate(replace(state, tasks={**state.tasks, event.task.id: event.task}))
+        case RobotFailed():
+            return _robot_failed(state, event)
         case MissionFinished():
             return replace(state, finished=True), ()
         case _:
@@ -232,7 +240,7 @@ def _fits(state: State, robot: str, route: Route) -> bool:
     """Whether a route delivers all that its robot can, and takes up only what it may."""
     carrying = set(state.robots[robot].carrying) - state.stranded.keys()
     tasks = {stop.task for stop in route}
-    may_begin = set(state.open_tasks())
+    may_begin = set(state.open_tasks()) if robot not in state.failed else set()
     return carrying <= tasks and all(
         task in may_begin and (robot, task) not in state.refused for task in tasks - carrying
     )
@@ -276,6 +284,15 @@ def _stop_served(state: State, event: StopServed) -> tuple[State, tuple[Action, 
     if state.waiting() or (state.reconsiders and state.open_tasks()):
         return _allocate(state)
     return state, _finish_if_still(state)
+
+
+def _robot_failed(state: State, event: RobotFailed) -> tuple[State, tuple[Action, ...]]:
+    why = f"carried by {event.robot}, which failed"
+    lost = {id: why for id in state.robots[event.robot].carrying if id not in state.stranded}
+    state = replace(state, failed=state.failed | {event.robot}, stranded={**state.stranded, **lost})
+    state = _with(state, event.robot, route=(), stale=False)
+    state, more = _allocate(state)
+    return state, (Plan(event.robot, "command"), *more)
 
 
 def _finish_if_still(state: State) -> tuple[Action, ...]:

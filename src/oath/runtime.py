@@ -155,7 +155,7 @@ class Runtime:
         )
 
     def _plan(self, robot: str, reason: PlanReason) -> Planned:
-        at = self._fleet.cancel(robot, at_once=False)
+        at = self._fleet.cancel(robot, at_once=robot in self._state.failed)
         begin = time.perf_counter()
         plan = self._planners[robot].begin(at, self._services(robot))
         return self._planned(robot, reason, plan.length, plan.blocked, begin)

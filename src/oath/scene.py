@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
@@ -135,7 +135,7 @@ class _Posed:
             type=np.array([types.index(task.type) for task in tasks], dtype=np.int32),
             types=tuple(types),
             priority=np.array([_RANK[task.priority] for task in tasks], dtype=np.int8),
-            capability=np.array([[robot.can.get(t, 0.0) for t in types] for robot in robots]),
+            capability=np.array([self._capability(robot, types) for robot in robots]),
             capacity=np.array(room, dtype=np.int32),
             load=np.array([len(load) for load in loads], dtype=np.int32),
             max_tasks=np.full(len(robots), max(1, len(tasks)), dtype=np.int32),
@@ -161,6 +161,10 @@ class _Posed:
 
     def _stop(self, stop: RouteStop) -> Stop:
         return self.state.tasks[stop.task].stop(stop.stop)
+
+    def _capability(self, robot: Robot, types: Sequence[str]) -> list[float]:
+        works = robot.id not in self.state.failed
+        return [robot.can.get(name, 0.0) * works for name in types]
 
     def _mode(self, robot: Robot) -> int:
         return self.scene.world.mode_of[robot.id]
