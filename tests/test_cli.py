@@ -175,6 +175,8 @@ def test_what_people_read(write: Write, tmp_path: Path) -> None:
     assert (run.exit_code, run.stderr) == (0, "")
     assert "tiny: 2 of 2 tasks done by 2 robots" in run.stdout
     assert str(out / "routes.png") in run.stdout
+    timed = oath_("run", mission, "--points", 100, "--budget", "5ms")
+    assert timed.exit_code == 0, timed.stderr
     plan = oath_("plan", mission, "--points", 100, "--budget", "200ms")
     assert "+box -box" in plan.stdout
     assert "0 errors" in oath_("check", mission, "--points", 100).stdout
@@ -471,8 +473,9 @@ def test_unknown_allocators(write: Write, tmp_path: Path) -> None:
         ["--no-such-option"],
     ],
 )
-def test_bad_options(options: list[str], write: Write) -> None:
-    result = oath_("plan", write(TINY), *options)
+@pytest.mark.parametrize("command", ["run", "plan"])
+def test_bad_options(command: str, options: list[str], write: Write) -> None:
+    result = oath_(command, write(TINY), *options)
     assert result.exit_code == 2
     assert result.stdout == ""
     assert "Traceback" not in result.stderr
