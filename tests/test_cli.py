@@ -540,3 +540,10 @@ def test_answers_in_any_locale(write: Write) -> None:
         done = real("run", write(named), "--points", 50, *options, env=environment)
         assert done.returncode == 0, done.stderr
         assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(("rule", "warned"), [("F box", 2), ("!dock W box", 0)])
+def test_check_warns_of_rules_that_oblige_robots(rule: str, warned: int, write: Write) -> None:
+    mission = write(TINY + f"    rules: ['{rule}']\n")
+    warnings = json_of(oath_("check", mission, "--json", "--points", 100))["warnings"]
+    assert sum("breaks the rules if it is given no task" in line for line in warnings) == warned

@@ -263,6 +263,14 @@ def lint(scene: Scene) -> list[str]:
     for name in mission.task_types:
         if name not in needed:
             found.append(f"no task is of type '{name}'")
+    automaton = scene.rules.automaton
+    for robot in mission.robots:
+        here = roadmap.zones.at(robot.start)
+        if not any(automaton.settles(q, here) for q in automaton.initial):
+            found.append(
+                f"robot '{robot.id}' breaks the rules if it is given no task: they oblige it to do "
+                "something (!x W y obliges nobody, !x U y and F y do)"
+            )
     for m, mode in enumerate(roadmap.modes):
         who = f"{mode.motion.name} robots of radius {mode.radius:g} m"
         for gap in missed(roadmap, m):
