@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from oath import _core
 from oath.allocate.contract import Budget, reasons, with_routes
-from oath.allocate.oath import in_no_route
 from oath.allocate.problem import Problem
 from oath.allocate.rounds import follow
+from oath.allocate.stages import in_no_route
 from oath.model import Assignment, Route, RouteStop, StopName
 
 Routes = list[list[int]]

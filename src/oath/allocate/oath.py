@@ -17,7 +17,6 @@ from oath.allocate.clustering import Linkage, cluster
 from oath.allocate.contract import Budget
 from oath.allocate.problem import Problem
 from oath.allocate.selection import Method, select
-from oath.allocate.stages import in_no_route as in_no_route  # its importers look here
 from oath.allocate.stages import three_stages
 from oath.model import Assignment
 

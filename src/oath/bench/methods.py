@@ -27,21 +27,20 @@ POINTS = 2000
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How a method is named and drawn: it can be told apart by colour, marker and hatch alike."""
+    """How a method is named and drawn: it can be told apart by colour and by marker."""
 
     label: str
     colour: str
     marker: str
-    hatch: str
 
 
 LOOKS: dict[str, Look] = {
-    "cbba": Look("CBBA", "#E69F00", "s", "//"),
-    "kan": Look("KAN", "#56B4E9", "^", "\\\\"),
-    "kam": Look("KAM", "#009E73", "D", ".."),
-    "oath": Look("OATH", "#0072B2", "o", "xx"),
-    "lns": Look("LNS", "#D55E00", "*", ""),
-    "exact": Look("exact", "#CC79A7", "X", "++"),
+    "cbba": Look("CBBA", "#E69F00", "s"),
+    "kan": Look("KAN", "#56B4E9", "^"),
+    "kam": Look("KAM", "#009E73", "D"),
+    "oath": Look("OATH", "#0072B2", "o"),
+    "lns": Look("LNS", "#D55E00", "*"),
+    "exact": Look("exact", "#CC79A7", "X"),
 }
 """Okabe and Ito's palette, safe for the colour-blind."""
 

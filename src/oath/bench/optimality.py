@@ -41,9 +41,9 @@ OWN, DRAWN = "the paper's tasks", "random tasks"
 FAST, SLOW, BALANCED = "lns 50 ms", "lns 200 ms", "lns default"
 VARIANTS: dict[str, Look] = {
     **{name: LOOKS[name] for name in ("cbba", "kan", "kam", "oath")},
-    BALANCED: Look("LNS default (sum + makespan)", "#F0E442", "v", ""),
-    FAST: Look("LNS 50 ms", "#D55E00", "*", ""),
-    SLOW: Look("LNS 200 ms", "#000000", "P", ""),
+    BALANCED: Look("LNS default (sum + makespan)", "#F0E442", "v"),
+    FAST: Look("LNS 50 ms", "#D55E00", "*"),
+    SLOW: Look("LNS 200 ms", "#000000", "P"),
     "exact": LOOKS["exact"],
 }
 

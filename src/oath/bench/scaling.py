@@ -37,8 +37,8 @@ DRIVEN = 4
 SHORT, LONG = "lns 1 s", "lns 30 s"
 METHODS: dict[str, Look] = {
     "oath": LOOKS["oath"],
-    SHORT: Look("LNS 1 s", "#D55E00", "*", ""),
-    LONG: Look("LNS 30 s", "#000000", "P", ""),
+    SHORT: Look("LNS 1 s", "#D55E00", "*"),
+    LONG: Look("LNS 30 s", "#000000", "P"),
 }
 
 

@@ -26,7 +26,7 @@ LINE_STYLES: tuple[Any, ...] = ("-", (0, (5, 1.2)), (0, (5, 1.2, 1, 1.2)), (0, (
 ROBOT_MARKERS = ("o", "s", "p", "P", "X", "*", "h")
 STOP_MARKERS = {"pickup": "^", "delivery": "v", "visit": "D"}
 KIND_COLOURS = ("#8F8F2E", "#882255", "#8B5E3C", "#6A7B8C", "#C9B458", "#777777")
-WALL_COLOUR, INK, FAINT = "#3C3C3C", "#1A1A1A", "#D4D4D4"
+WALL_COLOUR, INK = "#3C3C3C", "#1A1A1A"
 
 State = Literal["known", "unknown", "found", "never found", "removed"]
 Key = tuple[str, str]
