@@ -230,3 +230,32 @@ def test_no_tasks_no_robots() -> None:
     assert ask(Oath(), line([0.0], [])) == Assignment(routes={"r0": ()}, unassigned={})
     nobody = plan_all(line([], [(1, 2)]), Oath(), BUDGET, rng)
     assert nobody == Assignment(routes={}, unassigned={"t0": "no robot can do type 'a'"})
+
+
+def degenerate() -> dict[str, Problem]:
+    pair = line([0.0, 5.0], [(1.0, 2.0), (3.0, 4.0)])
+    blind, one_sided = pair.cost.copy(), pair.cost.copy()
+    blind[:, 2], blind[:, :, 2] = np.nan, np.nan  # the first pickup
+    one_sided[:, 0, 3] = np.inf
+    return {
+        "no robots": line([], [(1.0, 2.0)]),
+        "no tasks": line([0.0], []),
+        "nothing": line([], []),
+        "nobody can": line([0.0], [(1.0, 2.0)], capability=[[0.0]]),
+        "room for more than there is": line([0.0], [(1.0, 2.0), (3.0, 4.0)], capacity=50),
+        "one-sided": replace(pair, cost=one_sided),
+        "lopsided": replace(pair, cost=pair.cost * np.array([[[1.0], [2.0], [3.0]] * 2])),
+        "not a number": replace(pair, cost=blind),
+    }
+
+
+@pytest.mark.parametrize("case", degenerate())
+@pytest.mark.parametrize("name", sorted(ALLOCATORS))
+@pytest.mark.parametrize("budget", [BUDGET, Budget(seconds=0.0)])
+def test_odd_problems_get_an_answer_with_reasons(name: str, case: str, budget: Budget) -> None:
+    problem = degenerate()[case]
+    answer = plan_all(problem, ALLOCATORS[name](), budget, np.random.default_rng(0))
+    feasible = problem.feasible().any(axis=0) if problem.robots else [False] * len(problem.tasks)
+    for task, able in zip(problem.tasks, feasible, strict=True):
+        assert (task in answer.unassigned) == (not able)
+        assert able or answer.unassigned[task]
