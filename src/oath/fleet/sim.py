@@ -97,7 +97,6 @@ class SimFleet:
             robot.id: _Body(robot, mission.motions[robot.motion], robot.start)
             for robot in mission.robots
         }
-        self._tasks = {task.id: task for task in mission.tasks}
         self._now = 0.0
         self._agenda: list[tuple[float, int, str, int, str]] = []
         self._count = 0
