@@ -6,7 +6,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import dist, inf
 from pathlib import Path
@@ -45,7 +45,7 @@ from oath.events import (
     StopServed,
     TaskAdded,
 )
-from oath.fleet import Order
+from oath.fleet import Order, Pose
 from oath.fleet.sim import SimFleet
 from oath.formats.event_log import to_line
 from oath.model import Mission, Motion, Point
@@ -374,18 +374,18 @@ def test_a_robot_that_was_given_more_on_its_way_still_minds_the_way() -> None:
     mission = yard(
         [robot("cart", (1, 2)), robot("drone", (1, 9), motion="drone", can={"inspect": 1.0})],
         [
-            visit("urgent", (3.5, 2), type="inspect", priority="high"),
+            visit("second", (3.5, 2), type="inspect"),
             visit("far", (9, 9), type="inspect"),
         ],
         obstacles=(
-            bush("bush-1", box(3, 1.5, 4, 2.5)),  # turns the urgent task over to the drone
+            bush("bush-1", box(3, 1.5, 4, 2.5)),  # turns the second task over to the drone
             gate("gate-1", box(5, 8, 5.5, 9.8)),  # in the middle of the drone's first move
         ),
     )
     result = all_done(mission, points=5)
     assert [(stop.robot, stop.task) for stop in of(StopServed, result)] == [
         ("drone", "far"),
-        ("drone", "urgent"),
+        ("drone", "second"),
     ]
     assert result.summary["replans"] >= 2
 
@@ -672,8 +672,11 @@ class Eventful:
     def cancel(self, robot: str, *, at_once: bool) -> tuple[float, float]:
         return self.sim.cancel(robot, at_once=at_once)
 
-    def events(self) -> Sequence[AnyEvent]:
-        due = list(self.sim.events())
+    def poses(self) -> Mapping[str, Pose]:
+        return self.sim.poses()
+
+    def events(self, until: float = inf) -> Sequence[AnyEvent]:
+        due = list(self.sim.events(until))
         while self.extra and (not due or due[-1].t >= self.extra[0].t):
             # The simulator's clock has moved on already: it happens now.
             now = due[-1].t if due else self.extra[0].t
@@ -710,9 +713,13 @@ def test_others_take_over_from_a_robot_that_fails(allocator: str) -> None:
     robots = [robot("r1", (1, 1)), robot("r2", (9, 1))]
     tasks = [delivery("a", (1, 3), (1, 9)), visit("b", (2, 9)), visit("c", (9, 9))]
     result = run_with(yard(robots, tasks), allocator, RobotFailed(t=2.5, robot="r1"))
-    assert result.summary["unserved"] == {"a": "carried by r1, which failed"}
-    served = {stop.task: stop.robot for stop in of(StopServed, result) if stop.stop == "visit"}
-    assert served == {"b": "r2", "c": "r2"}
+    assert result.summary["unserved"] == {}
+    served = {stop.task: stop.robot for stop in of(StopServed, result)}
+    assert served == {"a": "r2", "b": "r2", "c": "r2"}
+    # What it carried is fetched where it stopped.
+    (first, again) = (stop for stop in of(StopServed, result) if stop.stop == "pickup")
+    assert (first.robot, first.at) == ("r1", (1, 3))
+    assert (again.robot, again.at) == ("r2", of(Moved, result, "r1")[-1].to)
 
 
 def test_when_every_robot_fails_the_mission_ends() -> None:

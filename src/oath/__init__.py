@@ -14,7 +14,7 @@ Examples
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -96,6 +96,11 @@ def run(
     chosen = named(allocator, makespan_weight=makespan_weight)
     scene = prepare(mission, Params(points=points), seed)
     require_reachable(scene)
+
+    def each(events: Sequence[AnyEvent]) -> None:
+        for event in events:
+            on_event(event)
+
     return Runtime(
         scene,
         SimFleet(mission),
@@ -103,7 +108,7 @@ def run(
         allocator=chosen,
         budget=Budget(seconds=seconds),
         seed=seed,
-        on_event=on_event,
+        journal=each,
     ).run()
 
 

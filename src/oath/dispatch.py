@@ -6,23 +6,34 @@ as events, so the events alone rebuild every state.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from oath.events import (
     Allocated,
     AnyEvent,
+    Commanded,
     MissionFinished,
     MissionStarted,
     Moved,
+    ObstacleAdded,
     ObstacleFound,
+    ObstacleRemoved,
     Planned,
     PlanReason,
+    PriorityChanged,
     RobotFailed,
+    RobotPaused,
+    RobotResumed,
     StopServed,
     TaskAdded,
+    TaskCancelled,
 )
-from oath.model import Mission, Point, Route, RouteStop, Task
+from oath.model import Mission, Obstacle, Point, Priority, Route, RouteStop, Stop, Task
+
+RECONSIDER = 0.05
+"""Share by which a way must grow for an obstacle to ask for another assignment."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +48,8 @@ class RobotState:
     carrying: tuple[str, ...] = ()
     stale: bool = False
     """The plan ends differently than the route; it is due anew after the next stop."""
+    left: float = 0.0
+    """What was planned less what was driven since [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,18 +76,54 @@ class State:
     dirty: bool = False
     """Something changed while an allocation was in flight."""
     finished: bool = False
+    paused: frozenset[str] = frozenset()
+    """Robots that are told to hold; they keep their routes and get nothing new."""
+    obstacles: Mapping[str, Obstacle] = field(default_factory=dict)
+    """Everything that stands in the way and is known."""
+    hidden: Mapping[str, Obstacle] = field(default_factory=dict)
+    """What the mission says is there to be found."""
+    labels: frozenset[str] = frozenset()
+    """Every task label ever used."""
+    obstacle_ids: frozenset[str] = frozenset()
+    """Every obstacle id ever used."""
+    changes: int = 0
+    """How often tasks, priorities, obstacles or the robots' condition have changed."""
+    undo: tuple[tuple[AnyEvent, ...], ...] = ()
+    """For every command that is not undone what takes it back; () if nothing can."""
+    recording: bool = False
+    """The events that follow are what the last command does."""
 
     @classmethod
     def of(cls, mission: Mission, *, reconsiders: bool = False) -> State:
         """The state before anything happened."""
-        robots = {robot.id: RobotState(position=robot.start) for robot in mission.robots}
-        tasks = {task.id: task for task in mission.tasks}
-        return cls(t=0.0, tasks=tasks, robots=robots, reconsiders=reconsiders)
+        obstacles = {obstacle.id: obstacle for obstacle in mission.map.obstacles}
+        return cls(
+            t=0.0,
+            tasks={task.id: task for task in mission.tasks},
+            robots={robot.id: RobotState(position=robot.start) for robot in mission.robots},
+            reconsiders=reconsiders,
+            obstacles={id: one for id, one in obstacles.items() if one.known},
+            hidden={id: one for id, one in obstacles.items() if not one.known},
+            labels=frozenset(task.id for task in mission.tasks),
+            obstacle_ids=frozenset(obstacles),
+        )
+
+    def carrier(self, task: str) -> str | None:
+        """The robot that has a task aboard."""
+        return next((id for id, robot in self.robots.items() if task in robot.carrying), None)
+
+    def urgent(self) -> tuple[str, ...]:
+        """Open tasks of high priority."""
+        return tuple(id for id in self.open_tasks() if self.tasks[id].priority == "high")
+
+    def deliverable(self, robot: str) -> tuple[str, ...]:
+        """What a robot carries and will deliver: neither stranded nor cancelled meanwhile."""
+        loads = self.robots[robot].carrying
+        return tuple(id for id in loads if id in self.tasks and id not in self.stranded)
 
     def carried(self) -> frozenset[str]:
         """Tasks that some robot has picked up and will deliver."""
-        loads = frozenset(task for robot in self.robots.values() for task in robot.carrying)
-        return loads - self.stranded.keys()
+        return frozenset(task for robot in self.robots for task in self.deliverable(robot))
 
     def open_tasks(self) -> tuple[str, ...]:
         """Tasks that nobody has picked up, in their given order."""
@@ -89,6 +138,10 @@ class State:
     def unserved(self) -> dict[str, str]:
         """Every task that is not done, and why."""
         reasons = {**self.unassigned, **self.stranded}
+        for id in self.paused:
+            robot = self.robots[id]
+            held = {stop.task for stop in robot.route} | set(robot.carrying)
+            reasons |= dict.fromkeys(held, f"given to {id}, which is paused")
         return {
             task: reasons.get(task, "not finished")
             for task in self.tasks
@@ -126,7 +179,7 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class UpdateMap:
-    """Put an obstacle on the map."""
+    """Put an obstacle on the map, or take it off if the state knows it no more."""
 
     obstacle: str
 
@@ -145,7 +198,7 @@ def advance(state: State, event: AnyEvent) -> tuple[State, tuple[Action, ...]]:
     Laws: `state` is not changed; equal arguments give equal results; no task is ever lost
     (completed, carried, stranded, routed and waiting partition the tasks).
     """
-    state = replace(state, t=max(state.t, event.t))
+    state = _record(replace(state, t=max(state.t, event.t)), event)
     match event:
         case MissionStarted():
             return _allocate(state)
@@ -154,25 +207,108 @@ def advance(state: State, event: AnyEvent) -> tuple[State, tuple[Action, ...]]:
         case Planned():
             return _planned(state, event)
         case Moved():
-            return _with(state, event.robot, position=event.to), ()
+            left = state.robots[event.robot].left - math.dist(event.from_, event.to)
+            return _with(state, event.robot, position=event.to, left=max(left, 0.0)), ()
         case StopServed():
             return _stop_served(state, event)
         case ObstacleFound():
-            # Even a robot without a route may still be on its last move.
-            repairs = (Repair(robot, event.obstacle) for robot in state.robots)
-            actions: tuple[Action, ...] = (UpdateMap(event.obstacle), *repairs)
-            if state.reconsiders and any(robot.route for robot in state.robots.values()):
-                state, more = _allocate(state)
-                actions += more
-            return state, actions
+            told = state.hidden.get(event.obstacle)
+            kind = told.kind if told is not None else "obstacle"
+            known = Obstacle(id=event.obstacle, kind=kind, polygon=event.polygon)
+            return _obstacle_added(state, known)
+        case ObstacleAdded():
+            known = Obstacle(id=event.obstacle, kind=event.kind, polygon=event.polygon)
+            return _obstacle_added(state, known)
+        case ObstacleRemoved():
+            return _obstacle_removed(state, event)
         case TaskAdded():
-            return _allocate(replace(state, tasks={**state.tasks, event.task.id: event.task}))
+            added = {**state.tasks, event.task.id: event.task}
+            return _allocate(replace(state, tasks=added, labels=state.labels | {event.task.id}))
+        case TaskCancelled():
+            return _task_cancelled(state, event)
+        case PriorityChanged():
+            changed = replace(state.tasks[event.task], priority=event.priority)
+            return _allocate(replace(state, tasks={**state.tasks, event.task: changed}))
         case RobotFailed():
             return _robot_failed(state, event)
+        case RobotPaused():
+            return replace(state, paused=state.paused | {event.robot}), ()
+        case RobotResumed():
+            state = replace(state, paused=state.paused - {event.robot})
+            if state.robots[event.robot].route:
+                return state, (Plan(event.robot, "command"),)
+            return _allocate(state)
         case MissionFinished():
             return replace(state, finished=True), ()
-        case _:
+        case Commanded():
             return state, ()
+
+
+def failure(state: State, robot: str, at: Point) -> tuple[AnyEvent, ...]:
+    """What happens when a robot fails at a point [m]: what it carries is to be fetched there.
+
+    Each carried task is taken out of the mission and comes back with its pickup where it stands.
+    """
+    events: list[AnyEvent] = [RobotFailed(t=state.t, robot=robot)]
+    for id in state.robots[robot].carrying:
+        if id in state.tasks:
+            task = state.tasks[id]
+            stops = (Stop(name="pickup", at=at), *task.stops[1:])
+            events.append(TaskCancelled(t=state.t, task=id))
+            events.append(TaskAdded(t=state.t, task=replace(task, stops=stops)))
+    return tuple(events)
+
+
+CHANGES = (
+    TaskAdded,
+    TaskCancelled,
+    PriorityChanged,
+    ObstacleFound,
+    ObstacleAdded,
+    ObstacleRemoved,
+    RobotFailed,
+    RobotPaused,
+    RobotResumed,
+)
+
+
+def _record(state: State, event: AnyEvent) -> State:
+    """Count what changes the mission, and note what takes a command's changes back."""
+    if isinstance(event, CHANGES):
+        state = replace(state, changes=state.changes + 1)
+    if isinstance(event, Commanded):
+        if event.command.get("intent") == "undo":
+            return replace(state, undo=state.undo[:-1], recording=False)
+        return replace(state, undo=(*state.undo, ()), recording=True)
+    if not state.recording:
+        return state
+    opposite = _opposite(state, event)
+    if opposite is None:
+        return replace(state, recording=False)
+    return replace(state, undo=(*state.undo[:-1], (opposite, *state.undo[-1])))
+
+
+def _opposite(state: State, event: AnyEvent) -> AnyEvent | None:
+    """The event that takes a change back, seen from the state before it; None if none does."""
+    t = event.t
+    match event:
+        case TaskAdded(task=task):
+            return TaskCancelled(t=t, task=task.id)
+        case TaskCancelled(task=id):
+            return TaskAdded(t=t, task=state.tasks[id])
+        case PriorityChanged(task=id):
+            before: Priority = state.tasks[id].priority
+            return PriorityChanged(t=t, task=id, priority=before)
+        case ObstacleAdded(obstacle=id):
+            return ObstacleRemoved(t=t, obstacle=id)
+        case ObstacleRemoved(obstacle=id):
+            gone = state.obstacles[id]
+            return ObstacleAdded(t=t, obstacle=id, kind=gone.kind, polygon=gone.polygon)
+        case RobotPaused(robot=robot):
+            return RobotResumed(t=t, robot=robot)
+        case RobotResumed(robot=robot):
+            return RobotPaused(t=t, robot=robot)
+    return None
 
 
 def _with(state: State, robot: str, **changes: object) -> State:
@@ -238,7 +374,7 @@ def _is_served(state: State, robot: str, stop: RouteStop) -> bool:
 
 def _fits(state: State, robot: str, route: Route) -> bool:
     """Whether a route delivers all that its robot can, and takes up only what it may."""
-    carrying = set(state.robots[robot].carrying) - state.stranded.keys()
+    carrying = set(state.deliverable(robot))
     tasks = {stop.task for stop in route}
     may_begin = set(state.open_tasks()) if robot not in state.failed else set()
     return carrying <= tasks and all(
@@ -250,16 +386,23 @@ def _planned(state: State, event: Planned) -> tuple[State, tuple[Action, ...]]:
     robot, task = state.robots[event.robot], event.unreachable
     if not robot.route:
         return state, _finish_if_still(state)
+    before = robot.left
     state = _with(state, event.robot, stale=False)
     if event.length is not None:
-        return state, (Drive(event.robot),)
+        state = _with(state, event.robot, left=event.length)
+        drive: tuple[Action, ...] = (Drive(event.robot),) if event.robot not in state.paused else ()
+        longer = event.reason == "obstacle" and event.length > before * (1 + RECONSIDER)
+        if longer and state.reconsiders:
+            state, more = _allocate(state)
+            return state, drive + more
+        return state, drive
     # Without that task the rest may still be possible: what is carried stays, the rest goes back.
     if task in robot.carrying:
         why = f"carried by {event.robot}, which has no way to its delivery"
         state = replace(state, stranded={**state.stranded, task: why})
     elif task is not None:
         state = replace(state, refused=state.refused | {(event.robot, task)})
-    kept = set(robot.carrying) - state.stranded.keys()
+    kept = set(state.deliverable(event.robot))
     route = tuple(stop for stop in robot.route if stop.task in kept)
     state = _with(state, event.robot, route=route)
     actions: tuple[Action, ...] = (Plan(event.robot, event.reason),) if route else ()
@@ -280,10 +423,66 @@ def _stop_served(state: State, event: StopServed) -> tuple[State, tuple[Action, 
     route = robot.route[1:]
     state = _with(state, event.robot, position=event.at, route=route, carrying=carrying)
     if route:
-        return state, (Plan(event.robot, "allocated") if robot.stale else Drive(event.robot),)
+        on: tuple[Action, ...] = (
+            (Plan(event.robot, "allocated") if robot.stale else Drive(event.robot),)
+            if event.robot not in state.paused
+            else ()
+        )
+        if set(state.urgent()) & set(state.waiting()):  # there was no room for it before
+            state, more = _allocate(state)
+            return state, on + more
+        return state, on
     if state.waiting() or (state.reconsiders and state.open_tasks()):
         return _allocate(state)
     return state, _finish_if_still(state)
+
+
+def _obstacle_added(state: State, obstacle: Obstacle) -> tuple[State, tuple[Action, ...]]:
+    state = replace(
+        state,
+        obstacles={**state.obstacles, obstacle.id: obstacle},
+        hidden={id: one for id, one in state.hidden.items() if id != obstacle.id},
+        obstacle_ids=state.obstacle_ids | {obstacle.id},
+    )
+    # Even a robot without a route may still be on its last move.
+    repairs = (Repair(robot, obstacle.id) for robot in state.robots)
+    return state, (UpdateMap(obstacle.id), *repairs)
+
+
+def _obstacle_removed(state: State, event: ObstacleRemoved) -> tuple[State, tuple[Action, ...]]:
+    left = {id: one for id, one in state.obstacles.items() if id != event.obstacle}
+    state = replace(state, obstacles=left, refused=frozenset())
+    plans = (Plan(id, "command") for id, robot in state.robots.items() if robot.route)
+    # Stops may be within reach again, and ways may be shorter.
+    state, more = _allocate(state)
+    return state, (UpdateMap(event.obstacle), *plans, *more)
+
+
+def _task_cancelled(state: State, event: TaskCancelled) -> tuple[State, tuple[Action, ...]]:
+    id = event.task
+    plans: tuple[Action, ...] = ()
+    state = replace(
+        state,
+        tasks={task: value for task, value in state.tasks.items() if task != id},
+        stranded={task: why for task, why in state.stranded.items() if task != id},
+        unassigned={task: why for task, why in state.unassigned.items() if task != id},
+        refused=frozenset(pair for pair in state.refused if pair[1] != id),
+        completed=state.completed - {id},
+    )
+    for name, robot in state.robots.items():
+        if id in robot.carrying and name in state.failed:
+            load = tuple(task for task in robot.carrying if task != id)
+            state = _with(state, name, carrying=load)
+        route = tuple(stop for stop in robot.route if stop.task != id)
+        if id in robot.carrying:
+            # It stays aboard, where it takes the room that pickups on the way counted on.
+            route = tuple(stop for stop in route if stop.task in robot.carrying)
+        if route != robot.route:
+            state = _with(state, name, route=route, stale=True)
+            if route[:1] != robot.route[:1]:
+                plans = (*plans, Plan(name, "command"))
+    state, more = _allocate(state)
+    return state, plans + more
 
 
 def _robot_failed(state: State, event: RobotFailed) -> tuple[State, tuple[Action, ...]]:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from oath.allocate import Allocator, Budget, ByPriority, checked
+from oath.commands import Command, Live, admit
 from oath.dispatch import (
     Action,
     Allocate,
@@ -22,23 +23,25 @@ from oath.dispatch import (
     State,
     UpdateMap,
     advance,
+    failure,
 )
 from oath.events import (
     Allocated,
     AnyEvent,
-    Event,
     MissionFinished,
     MissionStarted,
     Moved,
     ObstacleFound,
     Planned,
     PlanReason,
+    RobotFailed,
+    RobotPaused,
     StopServed,
 )
 from oath.fleet import Fleet, Order
 from oath.model import Mission, Obstacle, Route, Task
 from oath.motion.planner import Planner, Service
-from oath.scene import Scene, pose
+from oath.scene import Scene, UnderWay, pose
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +54,7 @@ class Result:
 
 
 class Runtime:
-    """Runs one mission.
+    """Runs one mission: `start` or `resume` it, `advance` its clock, `command`, `finish` it.
 
     Parameters
     ----------
@@ -59,8 +62,8 @@ class Runtime:
         The mission made ready, and the robots.
     name, allocator, budget, seed
         How tasks are assigned.
-    on_event
-        Called with every event before it is applied: the journal, the progress bar.
+    journal
+        Called with the events that happen together, before any of them is applied.
     """
 
     def __init__(
@@ -72,56 +75,143 @@ class Runtime:
         allocator: Allocator,
         budget: Budget,
         seed: int,
-        on_event: Callable[[AnyEvent], None] = lambda event: None,
+        journal: Callable[[Sequence[AnyEvent]], None] = lambda events: None,
     ) -> None:
-        self._scene, self._fleet = scene, fleet
+        self.scene = scene
+        self._fleet, self._journal = fleet, journal
         self._name, self._allocator, self._budget, self._seed = name, allocator, budget, seed
-        self._on_event = on_event
         mission, world = scene.mission, scene.world
-        self._obstacles = {obstacle.id: obstacle for obstacle in mission.map.obstacles}
         self._planners = {
             robot.id: Planner(world.roadmap, scene.rules, world.mode_of[robot.id], robot.start)
             for robot in mission.robots
         }
-        self._state = State.of(mission, reconsiders=allocator.reconsiders)
-        self._events: list[AnyEvent] = []
+        self.state = State.of(mission, reconsiders=allocator.reconsiders)
+        self.events: list[AnyEvent] = []
+        self.now = 0.0
+        """Mission clock [s]: everything until then has happened."""
         self._rng = np.random.default_rng(seed)
 
-    def run(self) -> Result:
-        """Run the mission to its end; every task is then done or has a reason why not."""
-        started = MissionStarted(
-            t=0.0, mission=self._scene.mission.name, allocator=self._name, seed=self._seed
-        )
-        self._apply([started])
-        while not self._state.finished:
-            due = self._fleet.events()
-            self._apply(due if due else [self._finished()])
-        last = self._events[-1]
-        assert isinstance(last, MissionFinished)
-        return Result(dict(last.summary), tuple(self._events), self._scene)
+    def run(self, script: Iterable[tuple[float, Callable[[], None]]] = ()) -> Result:
+        """Run the mission to its end; every task is then done or has a reason why not.
+
+        Parameters
+        ----------
+        script
+            What else is to be done during the mission, and when [s]; in order.
+        """
+        self.start()
+        for at, act in script:
+            self.advance(at)
+            act()
+        self.advance()
+        return self.finish()
+
+    def start(self) -> None:
+        """Begin the mission."""
+        name = self.scene.mission.name
+        self._apply([MissionStarted(t=0.0, mission=name, allocator=self._name, seed=self._seed)])
+
+    def resume(self, events: Iterable[AnyEvent]) -> None:
+        """Go on where these events end; the fleet's robots must stand where they were last seen."""
+        for event in events:
+            self.events.append(event)
+            self._track(event)
+            self.state, actions = advance(self.state, event)
+            for action in actions:
+                if isinstance(action, UpdateMap):
+                    self._perform(action)
+        self.now = self.state.t
+        if self.state.finished or not self.events:
+            return
+        self._rng = np.random.default_rng((self._seed, self.state.rounds))
+        due: list[Action] = [
+            Plan(id, "command") for id, robot in self.state.robots.items() if robot.route
+        ]
+        self._work(deque([*due, *[Allocate()] * self.state.allocating]))
+
+    def advance(self, until: float = math.inf) -> None:
+        """Let everything happen that happens until some time [s]; by default, all there is."""
+        while due := self._fleet.events(until):
+            self._apply(due)
+        self.now = max(self.now, self.state.t, until if until < math.inf else 0.0)
+
+    def live(self) -> Live:
+        """The mission as it is now."""
+        poses = {robot: pose.at for robot, pose in self._fleet.poses().items()}
+        state = replace(self.state, t=max(self.now, self.state.t))
+        return Live(self.scene, state, poses)
+
+    def command(self, commands: Sequence[Command], source: str) -> tuple[AnyEvent, ...]:
+        """Carry out commands, all or none; return what happened first of all.
+
+        Parameters
+        ----------
+        commands
+            Applied in order, each in the world that those before it make.
+        source
+            Who asks, for the journal.
+
+        Raises
+        ------
+        BadInput
+            If one of them is not possible; then nothing has changed.
+        """
+        events = admit(self.live(), commands, source)
+        # Robots that must stand come to rest first: the log says where before it says why.
+        halting = [e.robot for e in events if isinstance(e, RobotPaused | RobotFailed)]
+        for robot in halting:
+            self._fleet.cancel(robot, at_once=True)
+        if halting:
+            self.advance(self.now)
+            events = admit(self.live(), commands, source)
+        self._together(events)
+        return events
+
+    def finish(self) -> Result:
+        """End the mission; what is not done then has a reason."""
+        summary = summarise(self.scene.mission, self.state, self.events)
+        self._apply([MissionFinished(t=self.state.t, summary=summary)])
+        return Result(summary, tuple(self.events), self.scene)
 
     def _apply(self, events: Sequence[AnyEvent]) -> None:
         """Apply events in order, each with all that follows from it before the next."""
         # What is computed for one state must not wait until another event has changed it.
-        work: deque[AnyEvent | Action] = deque(events)
+        for event in events:
+            if isinstance(event, RobotFailed):
+                at = self.state.robots[event.robot].position
+                self._together(failure(self.state, event.robot, at))
+            else:
+                self._together([event])
+
+    def _together(self, events: Sequence[AnyEvent]) -> None:
+        """Apply events that make one change, then all that follows from them."""
+        self._work(deque([tuple(events)]))
+
+    def _work(self, work: deque[tuple[AnyEvent, ...] | Action]) -> None:
         while work:
             item = work.popleft()
-            if isinstance(item, Event):
-                self._on_event(item)
-                self._events.append(item)
-                self._track(item)
-                self._state, actions = advance(self._state, item)
-                work.extendleft(reversed(actions))
+            if isinstance(item, tuple):
+                work.extendleft(reversed(self._happen(item)))
             elif isinstance(item, Allocate) and work:
                 work.append(item)  # a round should know all that has happened
             else:
-                work.extendleft(reversed(self._perform(item)))
+                work.extendleft((event,) for event in reversed(self._perform(item)))
+
+    def _happen(self, events: tuple[AnyEvent, ...]) -> list[Action]:
+        self._journal(events)
+        follow: list[Action] = []
+        for event in events:
+            self.events.append(event)
+            self._track(event)
+            self.state, actions = advance(self.state, event)
+            follow += actions
+        return follow
 
     def _track(self, event: AnyEvent) -> None:
         if isinstance(event, Moved):
             self._planners[event.robot].moved(event.to)
         elif isinstance(event, StopServed):
-            self._planners[event.robot].served()
+            self._planners[event.robot].served(self._service(event.task, event.stop).letter)
 
     def _perform(self, action: Action) -> list[AnyEvent]:
         match action:
@@ -130,32 +220,49 @@ class Runtime:
             case Plan(robot, reason):
                 return [self._plan(robot, reason)]
             case Repair(robot, obstacle):
-                return self._repair(robot, self._obstacles[obstacle])
+                return self._repair(robot, self.state.obstacles[obstacle])
             case Drive(robot):
                 self._drive(robot)
             case UpdateMap(obstacle):
-                edges = self._scene.world.roadmap.add_obstacle(self._obstacles[obstacle])
-                for planner in self._planners.values():
-                    planner.update(edges)
+                self._update_map(obstacle)
             case Finish():
-                pass  # `run` ends when no robot reports anything any more
+                pass  # a run ends when nothing happens any more, a server when it is told to
         return []
+
+    def _update_map(self, obstacle: str) -> None:
+        roadmap = self.scene.world.roadmap
+        if obstacle in self.state.obstacles:
+            edges = roadmap.add_obstacle(self.state.obstacles[obstacle])
+        else:
+            edges = roadmap.remove_obstacle(obstacle)
+        for planner in self._planners.values():
+            planner.update(edges)
 
     def _allocate(self) -> Allocated:
         begin = time.perf_counter()
-        to_go = {id: planner.to_go() for id, planner in self._planners.items()}
-        problem = pose(self._scene, self._state, to_go)
+        problem = pose(self.scene, self.state, self._under_way())
         assignment = checked(ByPriority(self._allocator), problem, self._budget, self._rng)
         return Allocated(
-            t=self._state.t,
-            round=self._state.rounds + 1,
+            t=self.state.t,
+            round=self.state.rounds + 1,
             seconds=time.perf_counter() - begin,
             routes=assignment.routes,
             unassigned=assignment.unassigned,
         )
 
+    def _under_way(self) -> dict[str, UnderWay]:
+        found = {}
+        for id, robot in self.state.robots.items():
+            if robot.route:
+                planner, at = self._planners[id], self._fleet.poses()[id].at
+                rest = planner.rest()
+                to_rest = math.dist(at, rest)
+                driven = math.dist(planner.position, at)
+                found[id] = UnderWay(max(planner.to_go() - driven, 0.0), rest, to_rest)
+        return found
+
     def _plan(self, robot: str, reason: PlanReason) -> Planned:
-        at = self._fleet.cancel(robot, at_once=robot in self._state.failed)
+        at = self._fleet.cancel(robot, at_once=robot in self.state.failed)
         begin = time.perf_counter()
         plan = self._planners[robot].begin(at, self._services(robot))
         return self._planned(robot, reason, plan.length, plan.blocked, begin)
@@ -166,7 +273,7 @@ class Runtime:
             return []
         at = self._fleet.cancel(robot, at_once=True)
         begin = time.perf_counter()
-        stale = self._state.robots[robot].stale
+        stale = self.state.robots[robot].stale
         plan = planner.begin(at, self._services(robot)) if stale else planner.replan(at)
         return [self._planned(robot, "obstacle", plan.length, plan.blocked, begin)]
 
@@ -174,9 +281,9 @@ class Runtime:
         self, robot: str, reason: PlanReason, length: float, blocked: int | None, begin: float
     ) -> Planned:
         seconds = time.perf_counter() - begin
-        route = self._state.robots[robot].route
+        route = self.state.robots[robot].route
         return Planned(
-            t=self._state.t,
+            t=self.state.t,
             robot=robot,
             seconds=seconds,
             length=length if blocked is None else None,
@@ -185,31 +292,26 @@ class Runtime:
         )
 
     def _services(self, robot: str) -> list[Service]:
-        route: Route = self._state.robots[robot].route
-        zones = self._scene.world.roadmap.zones
-        services = []
-        for entry in route:
-            task: Task = self._state.tasks[entry.task]
-            stop = task.stop(entry.stop)
-            letter = zones.at(stop.at)
-            if stop is task.stops[-1]:
-                letter |= {task.id}
-            services.append(Service(at=stop.at, own=f"{task.id}@{stop.name}", letter=letter))
-        return services
+        route: Route = self.state.robots[robot].route
+        return [self._service(entry.task, entry.stop) for entry in route]
+
+    def _service(self, task_id: str, name: str) -> Service:
+        task: Task = self.state.tasks[task_id]
+        stop = task.stop(name)
+        letter = self.scene.world.roadmap.zones.at(stop.at)
+        if stop is task.stops[-1]:
+            letter |= {task.id}
+        return Service(at=stop.at, own=f"{task.id}@{stop.name}", letter=letter)
 
     def _drive(self, robot: str) -> None:
-        entry = self._state.robots[robot].route[0]
+        entry = self.state.robots[robot].route[0]
         order = Order(
             path=tuple(self._planners[robot].leg()),
             task=entry.task,
             stop=entry.stop,
-            service_time=self._state.tasks[entry.task].service_time,
+            service_time=self.state.tasks[entry.task].service_time,
         )
         self._fleet.send(robot, order)
-
-    def _finished(self) -> MissionFinished:
-        summary = summarise(self._scene.mission, self._state, self._events)
-        return MissionFinished(t=self._state.t, summary=summary)
 
 
 def summarise(mission: Mission, state: State, events: Sequence[AnyEvent]) -> dict[str, Any]:
@@ -225,7 +327,7 @@ def summarise(mission: Mission, state: State, events: Sequence[AnyEvent]) -> dic
                 per_robot[event.robot]["distance"] += math.dist(event.from_, event.to)
             case StopServed():
                 makespan = event.t
-                is_last = event.stop == state.tasks[event.task].stops[-1].name
+                is_last = event.stop != "pickup"
                 per_robot[event.robot]["tasks"] += int(is_last)
             case Allocated():
                 rounds, allocation = event.round, allocation + event.seconds

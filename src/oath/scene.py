@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from oath.allocate import Allocator, Budget, ByPriority, follow, plan_all
+from oath.allocate import Allocator, Budget, ByPriority, follow, plan_all, urgent
 from oath.allocate.problem import Aboard, Problem
 from oath.dispatch import State
 from oath.errors import BadInput
@@ -81,25 +81,81 @@ def require_reachable(scene: Scene) -> None:
         )
 
 
-def pose(scene: Scene, state: State, to_go: Mapping[str, float] = MappingProxyType({})) -> Problem:
+@dataclass(frozen=True, slots=True)
+class UnderWay:
+    """A robot that is driving to its next stop.
+
+    Attributes
+    ----------
+    to_go
+        How far it is to the stop [m].
+    rest, to_rest
+        Where its current move ends [m], and how far that is [m]: there it can turn.
+    """
+
+    to_go: float
+    rest: Point
+    to_rest: float
+
+
+def pose(
+    scene: Scene, state: State, under_way: Mapping[str, UnderWay] = MappingProxyType({})
+) -> Problem:
     """Put the open tasks and the robots of a state as an allocation problem.
 
-    `to_go` says how far robots under way are from their next stops [m].
+    What a robot does already is fixed; but urgent tasks come first. Each is given to the robot that
+    completes it soonest if it turns where its current move ends, whatever else was its next stop.
     """
-    return _Posed(scene, state, to_go).problem()
+    first: dict[str, Route] = {}
+    if under_way and (tasks := _pressing(state)):
+        turning = _Posed(scene, state, under_way, tasks, None).problem()
+        index = {task: p for p, task in enumerate(turning.tasks)}
+        first = dict(urgent(turning, [index[task] for task in tasks]).routes)
+    given = {stop.task for route in first.values() for stop in route}
+    return _Posed(scene, state, under_way, given, first).problem()
+
+
+def _pressing(state: State) -> list[str]:
+    """Urgent tasks but for those at which a robot is at work this moment."""
+    at_work = {robot.route[0].task for id, robot in state.robots.items() if _serves(state, id)}
+    return [task for task in state.urgent() if task not in at_work]
+
+
+def _serves(state: State, robot: str) -> bool:
+    """Whether a robot is at work at its next stop."""
+    route = state.robots[robot].route
+    if not route or robot in state.paused:
+        return False
+    stop = state.tasks[route[0].task].stop(route[0].stop)
+    return stop.at == state.robots[robot].position
 
 
 _RANK = {"high": 1, "normal": 0, "low": -1}
 
 
 class _Posed:
-    """A state on its way to arrays: locations are numbered as they occur."""
+    """A state on its way to arrays: locations are numbered as they occur.
 
-    def __init__(self, scene: Scene, state: State, to_go: Mapping[str, float]) -> None:
-        self.scene, self.state, self.to_go = scene, state, to_go
-        self.robots = scene.mission.robots
+    Parameters
+    ----------
+    urgent
+        Tasks that are in no route but those of `first`.
+    first
+        What robots do before anything else; None = every robot that can turn is free to.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        state: State,
+        under_way: Mapping[str, UnderWay],
+        urgent: Collection[str],
+        first: Mapping[str, Route] | None,
+    ) -> None:
+        self.scene, self.state, self.under_way = scene, state, under_way
+        self.robots, self.urgent, self.first = scene.mission.robots, frozenset(urgent), first
         self.fixed = [self._fixed(robot.id) for robot in self.robots]
-        begun = {route[0].task for route in self.fixed if route and state.reconsiders}
+        begun = {stop.task for route in self.fixed for stop in route if state.reconsiders}
         self.tasks = [state.tasks[id] for id in state.open_tasks() if id not in begun]
         self.places: dict[int, int] = {}
 
@@ -112,14 +168,16 @@ class _Posed:
         first = [self._location(task.stops[0].at) for task in tasks]
         last = [self._location(task.stops[-1].at) for task in tasks]
         aboard = tuple(self._aboard(robot, route) for robot, route in self._fixed_routes())
-        for _, route in self._fixed_routes():
+        for robot, route in self._fixed_routes():
+            if self._turns(robot, route):
+                self._location(self._here(robot))
             for stop in route:
                 self._location(self._stop(stop).at)
         nodes = list(self.places)
         modes = range(len(roadmap.modes))
         cost = np.array([self.scene.travel.between(mode, nodes) for mode in modes])
         refused = [[(robot.id, task.id) in state.refused for task in tasks] for robot in robots]
-        loads = [self._deliverable(robot.id) for robot in robots]
+        loads = [self.state.deliverable(robot.id) for robot in robots]
         room = [
             robot.capacity - len(state.robots[robot.id].carrying) + len(load)
             for robot, load in zip(robots, loads, strict=True)
@@ -148,22 +206,43 @@ class _Posed:
             ready=np.array([self._ready(*pair, cost) for pair in self._fixed_routes()]),
             aboard=aboard,
             routes=tuple(self.fixed),
-            previous=tuple(state.robots[robot.id].route for robot in robots),
+            previous=tuple(
+                self._previous(robot.id, route) for robot, route in self._fixed_routes()
+            ),
         )
 
     def _fixed_routes(self) -> list[tuple[Robot, Route]]:
         return list(zip(self.robots, self.fixed, strict=True))
 
+    def _rest(self, robot: str) -> Route:
+        """A robot's route less what is urgent."""
+        route = self.state.robots[robot].route
+        return tuple(stop for stop in route if stop.task not in self.urgent)
+
     def _fixed(self, robot: str) -> Route:
         """What a robot does in any case: its route, or its next stop if routes may change."""
-        route = self.state.robots[robot].route
-        return route[:1] if self.state.reconsiders else route
+        state, rest = self.state, self._rest(robot)
+        if robot in state.paused:
+            return rest
+        next_stop = rest[:1] if rest[:1] == state.robots[robot].route[:1] else ()
+        if _serves(state, robot):
+            first = next_stop + (self.first or {}).get(robot, ())
+        elif self.first is None:
+            return ()
+        else:
+            first = self.first.get(robot, ())
+        if not state.reconsiders:
+            return first + tuple(stop for stop in rest if stop not in first)
+        return first or next_stop
+
+    def _previous(self, robot: str, fixed: Route) -> Route:
+        return fixed + tuple(stop for stop in self._rest(robot) if stop not in fixed)
 
     def _stop(self, stop: RouteStop) -> Stop:
         return self.state.tasks[stop.task].stop(stop.stop)
 
     def _capability(self, robot: Robot, types: Sequence[str]) -> list[float]:
-        works = robot.id not in self.state.failed
+        works = robot.id not in self.state.failed | self.state.paused
         return [robot.can.get(name, 0.0) * works for name in types]
 
     def _mode(self, robot: Robot) -> int:
@@ -174,26 +253,35 @@ class _Posed:
 
     def _start(self, robot: Robot, route: Route) -> int:
         """Where a robot can begin something new: where what is fixed ends, or where it stands."""
-        here = self.state.robots[robot.id].position
-        return self._location(self._stop(route[-1]).at if route else here)
+        return self._location(self._stop(route[-1]).at if route else self._here(robot))
+
+    def _turns(self, robot: Robot, route: Route) -> bool:
+        """Whether what is fixed begins with another stop than the one the robot drives to."""
+        return route[:1] != self.state.robots[robot.id].route[:1]
+
+    def _here(self, robot: Robot) -> Point:
+        """Where a robot can turn."""
+        if robot.id in self.under_way:
+            return self.under_way[robot.id].rest
+        return self.state.robots[robot.id].position
 
     def _ready(self, robot: Robot, route: Route, cost: NDArray[np.float64]) -> float:
         """When a robot can begin something new [s from now]."""
-        if not route:
-            return 0.0
+        way = self.under_way.get(robot.id)
         places = [self._location(self._stop(stop).at) for stop in route]
-        length = self.to_go.get(robot.id, 0.0)
+        length = 0.0
+        if way is not None and self._turns(robot, route):
+            length = way.to_rest
+            places = [self._location(way.rest), *places]
+        elif way is not None:
+            length = way.to_go
         length += sum(cost[self._mode(robot), a, b] for a, b in pairwise(places))
         service = sum(self.state.tasks[stop.task].service_time for stop in route)
         return float(length / robot.speed + service)
 
-    def _deliverable(self, robot: str) -> list[str]:
-        carrying = self.state.robots[robot].carrying
-        return [task for task in carrying if task not in self.state.stranded]
-
     def _aboard(self, robot: Robot, route: Route) -> tuple[Aboard, ...]:
         """What a robot carries after the stops that are fixed, and must still deliver."""
-        ids = self._deliverable(robot.id)
+        ids = list(self.state.deliverable(robot.id))
         for stop in route:
             if stop.stop == "pickup":
                 ids.append(stop.task)

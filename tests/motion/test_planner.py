@@ -200,7 +200,7 @@ class Run:
     def serve(self) -> None:
         service = self.services.pop(0)
         self.states = step(self.rules, self.states, service.letter)
-        self.planner.served()
+        self.planner.served(service.letter)
 
     def reprice(self, rng: np.random.Generator) -> None:
         """Block, open or lengthen some edges anywhere."""
@@ -367,7 +367,7 @@ def test_a_new_route_begins_where_the_robot_is_and_keeps_the_rules_state() -> No
     planner.begin((4.0, 4.0), by_key)
     for to in planner.leg():
         planner.moved(to)
-    planner.served()
+    planner.served(frozenset({"key"}))
     plan = planner.begin(planner.position, into_lab)
     assert plan.blocked is None
     assert plan.length == pytest.approx(np.hypot(6, 3), rel=0.1)
@@ -467,7 +467,7 @@ def test_blocked_counts_the_remaining_stops_and_opens_again() -> None:
     planner.begin((1.0, 1.0), route((2.0, 2.0), (2.0, 6.0), (6.0, 6.0)))
     for to in planner.leg():
         planner.moved(to)
-    planner.served()
+    planner.served(frozenset())
     bar = Obstacle(id="bar", kind="crate", polygon=((4, -1), (4.5, -1), (4.5, 9), (4, 9)))
     planner.update(roadmap.add_obstacle(bar))
     assert planner.replan(planner.position).blocked == 1
@@ -497,7 +497,7 @@ def test_a_robot_at_its_stop_stays_there() -> None:
     assert plan.length == pytest.approx(2**0.5, rel=0.4)
     for _ in range(2):
         assert planner.leg() == []
-        planner.served()
+        planner.served(frozenset())
     assert planner.leg()[-1] == (2.0, 2.0)
 
 
@@ -567,7 +567,7 @@ def test_pulling_in_the_open_gives_the_straight_line() -> None:
     planner.begin((0.5, 0.5), route((0.6, 0.6), (7.5, 6.5)))
     assert planner.leg() == [(0.6, 0.6)]  # a stop in sight is driven to straight
     planner.moved((0.6, 0.6))
-    planner.served()
+    planner.served(frozenset())
     way = planner.leg()
     assert len(way) > 2
     assert along([(0.6, 0.6), *way]) == pytest.approx(np.hypot(6.9, 5.9))
@@ -626,7 +626,7 @@ def test_served_legs_no_longer_count() -> None:
     assert planner.touches(on_first)
     for to in planner.leg():
         planner.moved(to)
-    planner.served()
+    planner.served(frozenset())
     assert not planner.touches(on_first)
     assert planner._plan.length == pytest.approx(along(list(map(tuple, plan.legs[1]))))
 

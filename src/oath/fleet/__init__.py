@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -36,5 +37,20 @@ class Fleet(Protocol):
         It stops `at_once`, mid-edge, or finishes its current move first.
         """
 
-    def events(self) -> Sequence[AnyEvent]:
-        """Wait for what happens next; empty if nothing will happen without another order."""
+    def events(self, until: float = math.inf) -> Sequence[AnyEvent]:
+        """Wait for what happens next, until some time of the mission clock [s].
+
+        Empty if nothing happens until then; with no such time: if nothing will happen without
+        another order.
+        """
+
+    def poses(self) -> Mapping[str, Pose]:
+        """Where every robot is, at the time until which events were told."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Where a robot is [m; world frame] and where it heads [rad, from the x axis]."""
+
+    at: Point
+    heading: float

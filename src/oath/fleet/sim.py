@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from oath.events import AnyEvent, Moved, ObstacleFound, StopServed
-from oath.fleet import Order
+from oath.fleet import Order, Pose
 from oath.model import Mission, Motion, Obstacle, Point, Robot
 from oath.world.workspace import Workspace
 
@@ -78,26 +79,46 @@ class _Body:
     path: tuple[Point, ...] = ()
     move: tuple[Point, Point, float, float] | None = None
     """From, to, start and end of the current move."""
+    heading: float = 0.0
+    """[rad] of the last move."""
     ticket: int = 0
     """Scheduled happenings with an older ticket are void."""
 
 
 class SimFleet:
-    """Simulated robots of a mission, in a world where its unknown obstacles exist."""
+    """Simulated robots of a mission, in a world where its unknown obstacles exist.
 
-    def __init__(self, mission: Mission) -> None:
+    Parameters
+    ----------
+    mission
+        The robots and the world.
+    now, positions, found
+        A mission under way: its clock [s], where robots stand [m], and which of the unknown
+        obstacles are known by now.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        *,
+        now: float = 0.0,
+        positions: Mapping[str, Point] = MappingProxyType({}),
+        found: Collection[str] = (),
+    ) -> None:
         existing = tuple(replace(obstacle, known=True) for obstacle in mission.map.obstacles)
         workspace = Workspace(replace(mission.map, obstacles=existing))
         self._unknown = {
             obstacle.id: _Sight(obstacle, workspace)
             for obstacle in mission.map.obstacles
-            if not obstacle.known
+            if not obstacle.known and obstacle.id not in found
         }
         self._bodies = {
-            robot.id: _Body(robot, mission.motions[robot.motion], robot.start)
+            robot.id: _Body(
+                robot, mission.motions[robot.motion], positions.get(robot.id, robot.start)
+            )
             for robot in mission.robots
         }
-        self._now = 0.0
+        self._now = now
         self._agenda: list[tuple[float, int, str, int, str]] = []
         self._count = 0
         self._due: list[AnyEvent] = []
@@ -123,9 +144,9 @@ class SimFleet:
             return body.at
         return body.move[1]
 
-    def events(self) -> Sequence[AnyEvent]:
-        """What happens next; empty if no robot does anything."""
-        while not self._due and self._agenda:
+    def events(self, until: float = math.inf) -> Sequence[AnyEvent]:
+        """What happens next, see `Fleet`."""
+        while not self._due and self._agenda and self._agenda[0][0] <= until:
             t, _, robot, ticket, what = heapq.heappop(self._agenda)
             body = self._bodies[robot]
             if ticket != body.ticket:
@@ -139,8 +160,14 @@ class SimFleet:
                 self._serve(body)
             else:
                 self._find(body, what)
+        if not self._due and until < math.inf:
+            self._now = max(self._now, until)
         due, self._due = self._due, []
         return due
+
+    def poses(self) -> Mapping[str, Pose]:
+        """Where every robot is now."""
+        return {id: self._pose(body) for id, body in self._bodies.items()}
 
     # -- inside
 
@@ -162,19 +189,27 @@ class SimFleet:
         a, b = body.at, body.path[0]
         end = self._now + math.dist(a, b) / body.robot.speed
         body.move, body.path = (a, b, self._now, end), body.path[1:]
+        body.heading = math.atan2(b[1] - a[1], b[0] - a[0])
         self._schedule(body, end, "arrive")
         for id, sight in self._unknown.items():
             driven = self._first_sight(body, sight, a, b)
             if driven is not None:
                 self._schedule(body, self._now + driven / body.robot.speed, id)
 
-    def _end_move(self, body: _Body) -> None:
-        """Come to rest now, at the end of the current move or on the way."""
-        assert body.move is not None
+    def _pose(self, body: _Body) -> Pose:
+        if body.move is None:
+            return Pose(body.at, body.heading)
         a, b, start, end = body.move
         if self._now < end:
             share = (self._now - start) / (end - start)
             b = (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]))
+        return Pose(b, body.heading)
+
+    def _end_move(self, body: _Body) -> None:
+        """Come to rest now, at the end of the current move or on the way."""
+        assert body.move is not None
+        a, _, start, _ = body.move
+        b = self._pose(body).at
         body.at, body.move = b, None
         body.ticket += 1
         if self._now > start:

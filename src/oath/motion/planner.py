@@ -132,12 +132,24 @@ class Planner:
 
     def to_go(self) -> float:
         """How far it is to the current leg's stop [m], from where the robot was last seen."""
+        way = self._ahead()
+        return float(np.hypot(*np.diff(way, axis=0).T).sum())
+
+    def rest(self) -> Point:
+        """Where a robot that drives along the plan ends its current move [m]."""
+        if self._joins is not None:
+            return self._joins
+        way = self._ahead()
+        at = way[1] if len(way) > 1 else way[0]
+        return float(at[0]), float(at[1])
+
+    def _ahead(self) -> Array:
+        """What is left of the current leg, from the waypoint where the robot was last seen."""
+        here = np.array([self.position])
         if not self._plan.legs:
-            return 0.0
+            return here
         way = self._plan.legs[0]
-        hops = np.hypot(*np.diff(way, axis=0).T)
-        here = int(np.argmin(np.hypot(*(way - np.array(self.position)).T)))
-        return float(hops[here:].sum())
+        return way[int(np.argmin(np.hypot(*(way - here).T))) :]
 
     def moved(self, to: Point) -> None:
         """The robot drove straight from where it was to a point [m]."""
@@ -146,10 +158,9 @@ class Planner:
         if to == self._joins:
             self._joins = None
 
-    def served(self) -> None:
-        """The robot served the current leg's stop."""
-        service = self._services[self._leg]
-        self._states = self.rules.step(self._states, service.letter)
+    def served(self, letter: Letter) -> None:
+        """The robot served the current leg's stop, which made a letter true."""
+        self._states = self.rules.step(self._states, letter)
         self._leg += 1
         self._plan = _plan(self._plan.legs[1:])
 
