@@ -7,15 +7,22 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from oath import DEFAULT_ALLOCATOR
+from oath.cli.options import (
+    allocator_option,
+    budget_option,
+    examples,
+    json_option,
+    mission_argument,
+    points_option,
+    seed_option,
+    weight_option,
+)
 from oath.errors import OathError
 from oath.terminal import (
     counting,
@@ -55,71 +62,6 @@ class Program(click.Group):
             ctx.exit(2)
 
 
-def _examples(*lines: str) -> str:
-    return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)
-
-
-def _mission_argument(command: Callable[..., None]) -> Callable[..., None]:
-    return click.argument("mission", metavar="MISSION", type=click.Path(path_type=Path))(command)
-
-
-def _seed_option(command: Callable[..., None]) -> Callable[..., None]:
-    return click.option(
-        "--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Random seed."
-    )(command)
-
-
-def _json_option(command: Callable[..., None]) -> Callable[..., None]:
-    return click.option(
-        "--json", "as_json", is_flag=True, help="Print one JSON object and nothing else."
-    )(command)
-
-
-def _points_option(default: int) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    return click.option(
-        "--points",
-        default=default,
-        show_default=True,
-        type=click.IntRange(1, 1_000_000),
-        help="Sampled points of the roadmap.",
-    )
-
-
-def _allocator_option(command: Callable[..., None]) -> Callable[..., None]:
-    return click.option(
-        "--allocator", default=DEFAULT_ALLOCATOR, show_default=True, help="Who assigns the tasks."
-    )(command)
-
-
-def _weight_option(command: Callable[..., None]) -> Callable[..., None]:
-    # None tells an allocator that weighs nothing from one that was asked to.
-    return click.option(
-        "--makespan-weight",
-        type=click.FloatRange(min=0.0),
-        help="Weight of the makespan beside the sum of lengths [m/s], for allocators that minimise "
-        "both.  [default: 1]",
-    )(command)
-
-
-def _seconds(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
-    """Parse a duration such as 200ms or 1.5s [s]."""
-    if value is None:
-        return None
-    match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*(ms|s)", value)
-    if not match:
-        raise click.BadParameter(f"'{value}' is no duration; write e.g. 200ms or 1.5s")
-    return float(match[1]) * (1e-3 if match[2] == "ms" else 1.0)
-
-
-def _budget_option(command: Callable[..., None]) -> Callable[..., None]:
-    return click.option(
-        "--budget",
-        callback=_seconds,
-        help="Time to improve an answer: 200ms, 1.5s.  [default: a fixed number of iterations, the "
-        "same on every machine]",
-    )(command)
-
-
 @click.group(cls=Program, context_settings=CONTEXT)
 @click.version_option(package_name="oath-fleet", prog_name="oath")
 def main() -> None:
@@ -127,23 +69,23 @@ def main() -> None:
 
 
 @main.command(
-    epilog=_examples(
+    epilog=examples(
         "oath run missions/maze-25-gates.yaml --out out",
         "oath run missions/office.yaml --seed 7 --json",
     )
 )
-@_mission_argument
-@_allocator_option
-@_weight_option
-@_budget_option
-@_seed_option
-@_points_option(1000)
+@mission_argument
+@allocator_option
+@weight_option
+@budget_option
+@seed_option
+@points_option(1000)
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for events.jsonl, summary.json and routes.png.",
 )
-@_json_option
+@json_option
 def run(
     mission: Path,
     allocator: str,
@@ -194,19 +136,19 @@ def run(
 
 
 @main.command(
-    epilog=_examples(
+    epilog=examples(
         "oath plan missions/maze-25.yaml --allocator lns --budget 200ms --json",
         "oath plan missions/maze-15.yaml --allocator exact --makespan-weight 0 --max-tasks 5",
     )
 )
-@_mission_argument
-@_allocator_option
-@_weight_option
+@mission_argument
+@allocator_option
+@weight_option
 @click.option("--max-tasks", type=click.IntRange(min=1), help="Tasks per robot in all.")
-@_budget_option
-@_seed_option
-@_points_option(2000)
-@_json_option
+@budget_option
+@seed_option
+@points_option(2000)
+@json_option
 def plan(
     mission: Path,
     allocator: str,
@@ -265,11 +207,11 @@ def _plan_report(
     }
 
 
-@main.command(epilog=_examples("oath check missions/office.yaml"))
-@_mission_argument
-@_seed_option
-@_points_option(1000)
-@_json_option
+@main.command(epilog=examples("oath check missions/office.yaml"))
+@mission_argument
+@seed_option
+@points_option(1000)
+@json_option
 def check(mission: Path, seed: int, points: int, as_json: bool) -> None:
     """Validate a mission and point out what will go wrong or looks odd."""
     import oath
@@ -296,13 +238,13 @@ def check(mission: Path, seed: int, points: int, as_json: bool) -> None:
 
 @main.command(
     name="map",
-    epilog=_examples("oath map missions/maze-25.yaml --points 2000 --png roadmap.png"),
+    epilog=examples("oath map missions/maze-25.yaml --points 2000 --png roadmap.png"),
 )
-@_mission_argument
-@_seed_option
-@_points_option(1000)
+@mission_argument
+@seed_option
+@points_option(1000)
 @click.option("--png", type=click.Path(dir_okay=False, path_type=Path), help="Draw it to a file.")
-@_json_option
+@json_option
 def map_(mission: Path, seed: int, points: int, png: Path | None, as_json: bool) -> None:
     """Build the roadmap; print counts, connectivity and build time."""
     import oath
@@ -343,10 +285,10 @@ def map_(mission: Path, seed: int, points: int, png: Path | None, as_json: bool)
         raise click.exceptions.Exit(1)
 
 
-@main.command(epilog=_examples("oath verify missions/maze-25-gates.yaml out/events.jsonl"))
-@_mission_argument
+@main.command(epilog=examples("oath verify missions/maze-25-gates.yaml out/events.jsonl"))
+@mission_argument
 @click.argument("events", metavar="EVENTS", type=click.Path(path_type=Path))
-@_json_option
+@json_option
 def verify(mission: Path, events: Path, as_json: bool) -> None:
     """Judge an event log independently of what made it; list every violation."""
     import oath
@@ -385,7 +327,7 @@ def verify(mission: Path, events: Path, as_json: bool) -> None:
 
 
 @main.command(
-    epilog=_examples("oath bench optimality --quick", "oath bench all --out report --seeds 10")
+    epilog=examples("oath bench optimality --quick", "oath bench all --out report --seeds 10")
 )
 @click.argument("study", metavar="STUDY")
 @click.option("--quick", is_flag=True, help="A sketch in about a minute.")
@@ -419,7 +361,3 @@ def bench(study: str, quick: bool, seeds: int, out: Path) -> None:
         command = "oath bench all" + (" --quick" if quick else f" --seeds {seeds}")
         studies.report(outcomes, folder / "report.md", command=command)
         click.echo(f"see {folder / 'report.md'}")
-
-
-if __name__ == "__main__":
-    main()
