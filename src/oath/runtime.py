@@ -156,14 +156,14 @@ class Runtime:
         BadInput
             If one of them is not possible; then nothing has changed.
         """
-        events = admit(self.live(), commands, source)
+        events = admit(self.live(), commands, source).events
         # Robots that must stand come to rest first: the log says where before it says why.
         halting = [e.robot for e in events if isinstance(e, RobotPaused | RobotFailed)]
         for robot in halting:
             self._fleet.cancel(robot, at_once=True)
         if halting:
             self.advance(self.now)
-            events = admit(self.live(), commands, source)
+            events = admit(self.live(), commands, source).events
         self._together(events)
         return events
 

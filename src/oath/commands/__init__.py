@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from oath.commands.command import Command, Live
-from oath.commands.gate import admit
+from oath.commands.gate import Admitted, Trial, admit
 from oath.commands.obstacles import ObstacleUpdate, RemoveObstacle
 from oath.commands.robots import PauseRobot, ResumeRobot, RobotFailure
 from oath.commands.tasks import AddTask, CancelTask, ChangeTaskPriority
@@ -22,6 +22,7 @@ from oath.errors import BadInput, did_you_mean
 __all__ = [
     "COMMANDS",
     "AddTask",
+    "Admitted",
     "CancelTask",
     "ChangeTaskPriority",
     "Command",
@@ -32,6 +33,7 @@ __all__ = [
     "RemoveObstacle",
     "ResumeRobot",
     "RobotFailure",
+    "Trial",
     "Undo",
     "admit",
     "parse",

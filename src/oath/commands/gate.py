@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -30,37 +30,38 @@ LABEL = 64
 """Longest name of anything [characters]."""
 
 
-def admit(
-    live: Live, commands: Sequence[Command], source: str = "operator"
-) -> tuple[AnyEvent, ...]:
-    """Return the events that carry out commands, each command in the world of those before it.
+@dataclass(frozen=True, slots=True)
+class Admitted:
+    """What commands come to in the live world.
+
+    Attributes
+    ----------
+    commands
+        As they were filled.
+    says
+        Each in plain words.
+    events
+        What carries all of them out, each after its `Commanded`.
+    """
+
+    commands: tuple[Command, ...]
+    says: tuple[str, ...]
+    events: tuple[AnyEvent, ...]
+
+
+def admit(live: Live, commands: Sequence[Command], source: str = "operator") -> Admitted:
+    """Let commands through to the live world, each to the world of those before it.
 
     Raises
     ------
     BadInput
         If one of them is not possible in the live world: what, why and what to do.
     """
-    done: list[AnyEvent] = []
-    with _Trial(live) as trial:
-        for command in commands:
-            filled = command.filled(trial.live)
-            events = filled.events(trial.live)
-            if not events:
-                continue
-            plain = {
-                "intent": filled.intent,
-                "parameters": filled.model_dump(mode="json", exclude_none=True),
-            }
-            done.append(Commanded(t=live.state.t, command=plain, source=source))
-            trial.happen(done[-1])
-            for event in events:
-                trial.check(event)
-                trial.happen(event)
-            done += events
-    return tuple(done)
+    with Trial(live) as trial:
+        return trial.admit(commands, source)
 
 
-class _Trial:
+class Trial:
     """The live world and what commands make of it; all is as it was when the trial ends."""
 
     def __init__(self, live: Live) -> None:
@@ -68,7 +69,7 @@ class _Trial:
         self._undo: list[ObstacleAdded | ObstacleRemoved] = []
         self._known = dict(live.state.obstacles)
 
-    def __enter__(self) -> _Trial:
+    def __enter__(self) -> Trial:
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -78,6 +79,28 @@ class _Trial:
                 roadmap.remove_obstacle(event.obstacle)
             else:
                 roadmap.add_obstacle(self._known[event.obstacle])
+
+    def admit(self, commands: Sequence[Command], source: str = "operator") -> Admitted:
+        """Let commands happen in the trial, see `admit`."""
+        filled: list[Command] = []
+        says: list[str] = []
+        done: list[AnyEvent] = []
+        for command in commands:
+            filled.append(command.filled(self.live))
+            events = filled[-1].events(self.live)
+            says.append(filled[-1].says(self.live))
+            if events:
+                plain = {
+                    "intent": command.intent,
+                    "parameters": filled[-1].model_dump(mode="json", exclude_none=True),
+                }
+                told = Commanded(t=self.live.state.t, command=plain, source=source)
+                self.happen(told)
+                for event in events:
+                    self.check(event)
+                    self.happen(event)
+                done += [told, *events]
+        return Admitted(tuple(filled), tuple(says), tuple(done))
 
     def happen(self, event: AnyEvent) -> None:
         """Let an event have happened."""
