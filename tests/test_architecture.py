@@ -24,7 +24,7 @@ ROWS = (
     ("dispatch",),
     ("scene", "fleet", "store", "picture", "terminal"),
     ("commands",),
-    ("instruct",),
+    ("instruct", "preview"),
     ("runtime",),
     ("", "bench"),
     ("cli", "service"),

@@ -41,6 +41,7 @@ from oath.events import (
 from oath.fleet import Fleet, Order
 from oath.model import Mission, Obstacle, Route, Task
 from oath.motion.planner import Planner, Service
+from oath.preview import preview
 from oath.scene import Scene, UnderWay, pose
 
 
@@ -166,6 +167,10 @@ class Runtime:
             events = admit(self.live(), commands, source).events
         self._together(events)
         return events
+
+    def preview(self, commands: Sequence[Command]) -> tuple[str, ...]:
+        """Say what commands would do to the robots' routes; see `oath.preview.preview`."""
+        return preview(self.live(), commands, self._under_way(), self._allocator, self._seed)
 
     def finish(self) -> Result:
         """End the mission; what is not done then has a reason."""
