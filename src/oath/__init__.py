@@ -22,9 +22,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from oath.events import AnyEvent
     from oath.model import Assignment, Mission
-    from oath.runtime import Result
+    from oath.runtime import Result, Runtime
 
-__all__ = ["DEFAULT_ALLOCATOR", "allocate", "load", "run"]
+__all__ = ["DEFAULT_ALLOCATOR", "allocate", "load", "prepare", "run"]
 
 DEFAULT_ALLOCATOR = "lns"
 
@@ -56,6 +56,36 @@ def run(
 ) -> Result:
     """Run a mission in the built-in simulator, to its end.
 
+    Parameters and errors as for `prepare`.
+
+    Returns
+    -------
+    Result
+        `summary` and `events`; a task that could not be done stands in `summary["unserved"]`.
+    """
+    return prepare(
+        mission,
+        allocator=allocator,
+        makespan_weight=makespan_weight,
+        seconds=seconds,
+        seed=seed,
+        points=points,
+        on_event=on_event,
+    ).run()
+
+
+def prepare(
+    mission: Mission,
+    *,
+    allocator: str = DEFAULT_ALLOCATOR,
+    makespan_weight: float | None = None,
+    seconds: float | None = None,
+    seed: int = 0,
+    points: int = 1000,
+    on_event: Callable[[AnyEvent], None] = lambda event: None,
+) -> Runtime:
+    """Make a mission ready to run in the built-in simulator, and to take commands meanwhile.
+
     Parameters
     ----------
     mission
@@ -75,11 +105,6 @@ def run(
     on_event
         Called with every event as it happens.
 
-    Returns
-    -------
-    Result
-        `summary` and `events`; a task that could not be done stands in `summary["unserved"]`.
-
     Raises
     ------
     BadInput
@@ -90,11 +115,12 @@ def run(
     from oath.allocate import allocator as named
     from oath.fleet.sim import SimFleet
     from oath.runtime import Runtime
-    from oath.scene import prepare, require_reachable
+    from oath.scene import prepare as made_ready
+    from oath.scene import require_reachable
     from oath.world.roadmap import Params
 
     chosen = named(allocator, makespan_weight=makespan_weight)
-    scene = prepare(mission, Params(points=points), seed)
+    scene = made_ready(mission, Params(points=points), seed)
     require_reachable(scene)
 
     def each(events: Sequence[AnyEvent]) -> None:
@@ -109,7 +135,7 @@ def run(
         budget=Budget(seconds=seconds),
         seed=seed,
         journal=each,
-    ).run()
+    )
 
 
 def allocate(
@@ -123,7 +149,7 @@ def allocate(
 ) -> Assignment:
     """Assign all tasks of a mission at once, without executing anything.
 
-    Other parameters and errors as for `run`.
+    Other parameters and errors as for `prepare`.
 
     Parameters
     ----------
@@ -132,11 +158,12 @@ def allocate(
     """
     from oath.allocate import Budget
     from oath.allocate import allocator as named
-    from oath.scene import assign, prepare, require_reachable
+    from oath.scene import assign, require_reachable
+    from oath.scene import prepare as made_ready
     from oath.world.roadmap import Params
 
     chosen = named(allocator, makespan_weight=makespan_weight)
-    scene = prepare(mission, Params(points=points), seed)
+    scene = made_ready(mission, Params(points=points), seed)
     require_reachable(scene)
     return assign(scene, chosen, Budget(), seed, max_tasks).assignment
 

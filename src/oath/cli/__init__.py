@@ -23,6 +23,7 @@ from oath.cli.options import (
     seed_option,
     weight_option,
 )
+from oath.cli.talk import acts, chat, interpret
 from oath.errors import OathError
 from oath.terminal import (
     counting,
@@ -72,6 +73,7 @@ def main() -> None:
     epilog=examples(
         "oath run missions/maze-25-gates.yaml --out out",
         "oath run missions/office.yaml --seed 7 --json",
+        "oath run missions/maze-25.yaml --script missions/maze-25-script.yaml --out out",
     )
 )
 @mission_argument
@@ -85,6 +87,11 @@ def main() -> None:
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for events.jsonl, summary.json and routes.png.",
 )
+@click.option(
+    "--script",
+    type=click.Path(path_type=Path),
+    help="Timed instructions and commands to play into the mission (YAML).",
+)
 @json_option
 def run(
     mission: Path,
@@ -94,19 +101,25 @@ def run(
     seed: int,
     points: int,
     out: Path | None,
+    script: Path | None,
     as_json: bool,
 ) -> None:
     """Run a mission in the built-in simulator, to its last delivery."""
     import oath
 
     loaded = oath.load(mission)
+    entries = []
+    if script is not None:
+        from oath.formats.script import read as read_script
+
+        entries = read_script(script)
     with recording(out, loaded) as journal, progress(len(loaded.tasks)) as show:
 
         def on_event(event: AnyEvent) -> None:
             journal(event)
             show(event)
 
-        result = oath.run(
+        runtime = oath.prepare(
             loaded,
             allocator=allocator,
             makespan_weight=makespan_weight,
@@ -115,6 +128,7 @@ def run(
             points=points,
             on_event=on_event,
         )
+        result = runtime.run(acts(runtime, entries))
     if out is not None:
         from oath.picture import draw_run
 
@@ -324,6 +338,10 @@ def verify(mission: Path, events: Path, as_json: bool) -> None:
             click.echo(f"least distance between two robots: {verdict.least_separation:.2f} m")
     if not verdict.ok:
         raise click.exceptions.Exit(1)
+
+
+main.add_command(interpret)
+main.add_command(chat)
 
 
 @main.command(

@@ -104,8 +104,8 @@ def read_bytes(path: Path, *, limit: int = MAX_BYTES) -> bytes:
         ) from None
 
 
-def read_document(path: Path, *, what: str) -> Document:
-    """Read a YAML file whose top level is a mapping.
+def read_document(path: Path, *, what: str, top: type[yaml.Node] = yaml.MappingNode) -> Document:
+    """Read a YAML file whose top level is a mapping, or another kind of node.
 
     Parameters
     ----------
@@ -113,12 +113,14 @@ def read_document(path: Path, *, what: str) -> Document:
         The file.
     what
         What the file should be, for the messages, e.g. ``"mission"``.
+    top
+        Kind of its top level.
 
     Raises
     ------
     BadInput
-        If the file is missing, not UTF-8, not YAML, empty, not a mapping, repeats a key, has a key
-        that is not text, nests too deep or expands too far.
+        If the file is missing, not UTF-8, not YAML, empty, of another kind, repeats a key, has a
+        key that is not text, nests too deep or expands too far.
     """
     file = str(path)
     try:
@@ -130,11 +132,13 @@ def read_document(path: Path, *, what: str) -> Document:
             remedy=f"save the {what} as UTF-8",
         ) from None
     root = _compose(text, file, what)
-    if not isinstance(root, yaml.MappingNode):
+    if not isinstance(root, top):
+        is_list = top is yaml.SequenceNode
+        lines = "`- {key: value}`" if is_list else "`key: value`"
         raise BadInput(
-            f"the top level is a {_noun(root)}, not a mapping",
+            f"the top level is a {_noun(root)}, not a {'list' if is_list else 'mapping'}",
             file=f"{file}:{root.start_mark.line + 1}",
-            remedy=f"start a {what} with `key: value` lines",
+            remedy=f"start a {what} with {lines} lines",
         )
     _Expansion(file).measure(root)
     loader = _Loader("")

@@ -1,0 +1,241 @@
+"""Commands that listen: `interpret`, `chat`, and what a script says during `run`."""
+
+from __future__ import annotations
+
+import queue
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from oath.cli.options import (
+    allocator_option,
+    budget_option,
+    examples,
+    json_option,
+    mission_argument,
+    points_option,
+    seed_option,
+    weight_option,
+)
+
+if TYPE_CHECKING:
+    from oath.formats.script import Entry
+    from oath.instruct import Interpreter, Reply
+    from oath.instruct.conversation import Answer, Conversation
+    from oath.runtime import Runtime
+
+LINE = 20_000
+"""Longest line that is read whole from a terminal or pipe [characters]."""
+
+
+@click.command(
+    epilog=examples(
+        "echo 'new task at (5, 19.5), take it to c' | oath interpret missions/maze-25.yaml --json",
+        "oath interpret missions/maze-25.yaml --dialogue < dialogue.txt",
+    )
+)
+@mission_argument
+@click.option("--dialogue", is_flag=True, help="The lines are turns of one dialogue.")
+@seed_option
+@points_option(1000)
+@json_option
+def interpret(mission: Path, dialogue: bool, seed: int, points: int, as_json: bool) -> None:
+    """Interpret instructions from stdin, one a line; nothing is carried out without a yes.
+
+    With --json, every line gives one JSON object: status, intent, parameters, missing, message.
+    """
+    import json
+
+    import oath
+
+    runtime = oath.prepare(oath.load(mission), seed=seed, points=points)
+    interpreter = _interpreter()
+    conversation = _conversation(runtime, interpreter)
+    for line in _lines(sys.stdin):
+        if not dialogue:
+            conversation = _conversation(runtime, interpreter)
+        answer = conversation.say(line)
+        if as_json:
+            click.echo(json.dumps(_plain(answer.reply), ensure_ascii=False, allow_nan=False))
+        else:
+            click.echo(answer.reply.message)
+
+
+def _plain(reply: Reply) -> dict[str, Any]:
+    plain: dict[str, Any] = {
+        "status": reply.status,
+        "intent": reply.intent,
+        "parameters": dict(reply.parameters),
+        "missing": list(reply.missing),
+        "message": reply.message,
+    }
+    if len(reply.commands) > 1:
+        from oath.commands import to_plain
+
+        plain["commands"] = [to_plain(command) for command in reply.commands]
+    return plain
+
+
+@click.command(
+    epilog=examples("oath chat missions/maze-25.yaml", "oath chat missions/office.yaml --speed 5")
+)
+@mission_argument
+@allocator_option
+@weight_option
+@budget_option
+@seed_option
+@points_option(1000)
+@click.option(
+    "--speed",
+    default=1.0,
+    show_default=True,
+    type=click.FloatRange(0.01, 1000),
+    help="Mission seconds per second.",
+)
+def chat(
+    mission: Path,
+    allocator: str,
+    makespan_weight: float | None,
+    budget: float | None,
+    seed: int,
+    points: int,
+    speed: float,
+) -> None:
+    """Run a mission live and talk to it in the terminal; end with an empty line or Ctrl-D.
+
+    What is proposed is carried out after a yes; pause takes effect at once.
+    """
+    import oath
+
+    runtime = oath.prepare(
+        oath.load(mission),
+        allocator=allocator,
+        makespan_weight=makespan_weight,
+        seconds=budget or 0.05,
+        seed=seed,
+        points=points,
+    )
+    conversation = _conversation(runtime, _interpreter())
+    runtime.start()
+    begin, told = time.monotonic(), 0
+    click.echo(f"{runtime.scene.mission.name} runs. Say what has changed, or ask for the status.")
+    for line in _typed():
+        runtime.advance((time.monotonic() - begin) * speed)
+        told = _tell_news(runtime, told)
+        if line is None:
+            continue
+        if line.strip().casefold() in ("", "quit", "exit"):
+            break
+        click.echo(f"[{runtime.now:.1f} s] {conversation.say(line).reply.message}")
+    summary = runtime.finish().summary
+    click.echo(
+        f"stopped at {runtime.now:.1f} s with {summary['completed']} of {summary['tasks']} tasks "
+        "done"
+    )
+
+
+def _typed() -> Iterator[str | None]:
+    """Yield lines from stdin as they come, and None while there is none."""
+    lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+
+    def read() -> None:
+        for line in _lines(sys.stdin):
+            lines.put(line)
+        lines.put(None)
+
+    threading.Thread(target=read, daemon=True).start()
+    while True:
+        try:
+            line = lines.get(timeout=0.05)
+        except queue.Empty:
+            yield None
+            continue
+        if line is None:
+            return
+        yield line
+
+
+def _tell_news(runtime: Runtime, told: int) -> int:
+    """Print what an operator wants to know of the events since; return how many there are."""
+    from oath.events import ObstacleFound, RobotFailed, StopServed
+
+    for event in runtime.events[told:]:
+        match event:
+            case StopServed(stop="delivery" | "visit"):
+                left = len(runtime.state.tasks) - len(runtime.state.completed)
+                news = f"{event.robot} has done {event.task}; {left} tasks are left"
+            case ObstacleFound():
+                news = f"{event.robot} found {event.obstacle}"
+            case RobotFailed():
+                news = f"{event.robot} failed"
+            case _:
+                continue
+        click.echo(f"[{event.t:.1f} s] {news}")
+    return len(runtime.events)
+
+
+def acts(runtime: Runtime, entries: Iterable[Entry]) -> Iterator[tuple[float, Callable[[], None]]]:
+    """What a script does in a mission, and when [s]; every answer goes to stderr."""
+    from functools import partial
+
+    entries = list(entries)
+    if not entries:
+        return
+    conversation = _conversation(runtime, _interpreter())
+    for entry in entries:
+        yield entry.at, partial(_act, runtime, conversation, entry)
+
+
+def _act(runtime: Runtime, conversation: Conversation, entry: Entry) -> None:
+    from oath.commands import parse
+    from oath.errors import BadInput
+
+    if entry.say is not None:
+        answer, what = conversation.say(entry.say), entry.say
+    else:
+        try:
+            command = parse(entry.do)
+        except BadInput as error:
+            raise BadInput(
+                error.problem, file=entry.where, field=error.field, remedy=error.remedy
+            ) from None
+        answer, what = conversation.propose([command]), command.intent
+    _report(runtime, what, answer)
+    if answer.proposal is not None and entry.confirm:
+        _report(runtime, "yes", conversation.say("yes"))
+
+
+def _report(runtime: Runtime, what: str, answer: Answer) -> None:
+    click.echo(f"[{runtime.now:.1f} s] > {what}", err=True)
+    click.echo(f"[{runtime.now:.1f} s] {answer.reply.message}", err=True)
+
+
+def _lines(stream: Any) -> Iterator[str]:
+    """Yield lines without their ends; one that is too long comes cut, what is no text as it is."""
+    while line := stream.readline(LINE):
+        if len(line) == LINE and not line.endswith("\n"):
+            while (rest := stream.readline(LINE)) and not rest.endswith("\n"):
+                pass
+        yield line.rstrip("\r\n")
+
+
+def _interpreter() -> Interpreter:
+    from oath.instruct.offline import Offline
+
+    return Offline()
+
+
+def _conversation(runtime: Runtime, interpreter: Interpreter) -> Conversation:
+    from oath.instruct.conversation import Conversation
+
+    return Conversation(
+        interpreter,
+        runtime.live,
+        lambda commands: runtime.command(commands, "operator"),
+        preview=runtime.preview,
+    )
