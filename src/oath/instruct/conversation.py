@@ -238,9 +238,10 @@ def _complete(commands: Sequence[Command]) -> Reply:
 def _refusal(error: BadInput, reply: Reply) -> Reply:
     """Return why commands cannot be carried out; what is wrong may be given anew."""
     single = len(reply.commands) == 1 and error.field in type(reply.commands[0]).model_fields
+    open_ = single and getattr(reply.commands[0], str(error.field)) is None
     left = {key: value for key, value in reply.parameters.items() if key != error.field}
     return Reply(
-        status="clarification",
+        status="need_more_info" if open_ else "clarification",
         message=_sentence(error),
         intent=reply.intent,
         parameters=left if single else reply.parameters,
