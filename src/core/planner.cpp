@@ -14,6 +14,8 @@ namespace oath {
 
 namespace {
 
+constexpr long kLeast = 64;  // a repair may always take so many expansions
+
 Cost add(Cost a, Cost b) {
     return a >= kUnreachable || b >= kUnreachable ? kUnreachable : a + b;
 }
@@ -96,6 +98,8 @@ void Leg::set_start(Vec at, std::vector<Link> links, std::vector<int> states, bo
 }
 
 void Leg::changed(const std::vector<int>& edges) {
+    // To look at so many nodes anew would take longer than a search from scratch.
+    if (static_cast<long>(edges.size()) > 4 * std::max(scratch_, kLeast)) fresh_ = true;
     if (fresh_) return;
     grow();
     for (int e : edges) renew(graph_->from[e]), renew(graph_->to[e]);
@@ -119,7 +123,7 @@ void Leg::restart() {
 
 void Leg::search() {
     grow();
-    if (!fresh_ && run(std::max(scratch_, 64L))) return;
+    if (!fresh_ && run(std::max(scratch_, kLeast))) return;
     restart();
     const long before = expanded_;
     run(-1);

@@ -225,7 +225,7 @@ class Runtime:
             case Plan(robot, reason):
                 return [self._plan(robot, reason)]
             case Repair(robot, obstacle):
-                return self._repair(robot, self.state.obstacles[obstacle])
+                return self._repair(robot, self.state.obstacles.get(obstacle))
             case Drive(robot):
                 self._drive(robot)
             case UpdateMap(obstacle):
@@ -235,11 +235,11 @@ class Runtime:
         return []
 
     def _update_map(self, obstacle: str) -> None:
-        roadmap = self.scene.world.roadmap
-        if obstacle in self.state.obstacles:
-            edges = roadmap.add_obstacle(self.state.obstacles[obstacle])
-        else:
-            edges = roadmap.remove_obstacle(obstacle)
+        """Bring an obstacle of the map in line with the state; of what came and went nothing is left."""
+        roadmap, known = self.scene.world.roadmap, self.state.obstacles.get(obstacle)
+        if known == roadmap.workspace.obstacles.get(obstacle):
+            return
+        edges = roadmap.remove_obstacle(obstacle) if known is None else roadmap.add_obstacle(known)
         for planner in self._planners.values():
             planner.update(edges)
 
@@ -272,9 +272,9 @@ class Runtime:
         plan = self._planners[robot].begin(at, self._services(robot))
         return self._planned(robot, reason, plan.length, plan.blocked, begin)
 
-    def _repair(self, robot: str, obstacle: Obstacle) -> list[AnyEvent]:
+    def _repair(self, robot: str, obstacle: Obstacle | None) -> list[AnyEvent]:
         planner = self._planners[robot]
-        if not planner.touches(obstacle):
+        if obstacle is None or not planner.touches(obstacle):
             return []
         at = self._fleet.cancel(robot, at_once=True)
         begin = time.perf_counter()

@@ -24,7 +24,7 @@ from oath.events import (
     TaskAdded,
     TaskCancelled,
 )
-from oath.model import Obstacle, Point, Robot, Task
+from oath.model import Obstacle, Point, Robot, Stop, Task
 
 LABEL = 64
 """Longest name of anything [characters]."""
@@ -66,19 +66,15 @@ class Trial:
 
     def __init__(self, live: Live) -> None:
         self.live = live
-        self._undo: list[ObstacleAdded | ObstacleRemoved] = []
-        self._known = dict(live.state.obstacles)
+        self._roadmap = live.scene.world.roadmap
+        self._kept = self._roadmap.trial()
 
     def __enter__(self) -> Trial:
+        self._kept.__enter__()
         return self
 
     def __exit__(self, *error: object) -> None:
-        roadmap = self.live.scene.world.roadmap
-        for event in reversed(self._undo):
-            if isinstance(event, ObstacleAdded):
-                roadmap.remove_obstacle(event.obstacle)
-            else:
-                roadmap.add_obstacle(self._known[event.obstacle])
+        self._kept.__exit__(None, None, None)
 
     def admit(self, commands: Sequence[Command], source: str = "operator") -> Admitted:
         """Let commands happen in the trial, see `admit`."""
@@ -90,6 +86,8 @@ class Trial:
             events = filled[-1].events(self.live)
             says.append(filled[-1].says(self.live))
             if events:
+                if self.live.state.finished:
+                    raise BadInput("the mission has ended", remedy="start it again")
                 plain = {
                     "intent": command.intent,
                     "parameters": filled[-1].model_dump(mode="json", exclude_none=True),
@@ -124,8 +122,7 @@ class Trial:
                         field="obstacle",
                         remedy=did_you_mean(id, list(state.obstacles)),
                     )
-                self.live.scene.world.roadmap.remove_obstacle(id)
-                self._undo.append(event)
+                self._roadmap.remove_obstacle(id)
             case RobotPaused(robot=robot) | RobotResumed(robot=robot) | RobotFailed(robot=robot):
                 self._check_robot(event, robot)
             case _:
@@ -159,12 +156,12 @@ class Trial:
                     remedy="give a point in the open",
                 )
             able = fits
-        reached = [robot for robot in able if self._reaches(robot, task)]
-        if not reached:
+        reach = Reach(self.live)
+        points = [stop.at for stop in task.stops]
+        if not any(reach.all(robot, points) for robot in able):
             names = ", ".join(robot.id for robot in able)
             raise BadInput(
-                f"{' or '.join(show_point(stop.at) for stop in task.stops)} is out of reach of "
-                f"{names}",
+                f"{' or '.join(map(show_point, points))} is out of reach of {names}",
                 field="location",
                 remedy="give a point that the robot can drive to",
             )
@@ -236,62 +233,64 @@ class Trial:
                 field="obstacle_location",
                 remedy="keep it inside",
             )
-        for what, at, robots in self._occupied():
-            for robot in robots:
-                if not mission.motions[robot.motion].blocked_by(event.kind):
-                    break
-                gap = float(shapely.distance(polygon, shapely.Point(at)))
-                if gap >= robot.radius:
-                    break
-            else:
+        self._check_covered(event.kind, polygon)
+        before = self._shut_in()
+        obstacle = Obstacle(id=event.obstacle, kind=event.kind, polygon=event.polygon)
+        self._roadmap.add_obstacle(obstacle)
+        for what in sorted(self._shut_in() - before):
+            raise BadInput(
+                f"the obstacle would shut in {what}",
+                field="obstacle_location",
+                remedy="check the coordinates, or cancel the task or count out the robot first",
+            )
+
+    def _check_covered(self, kind: str, polygon: shapely.Polygon) -> None:
+        """Refuse what covers a robot, or a stop for all who could serve it."""
+        occupied = list(self._occupied())
+        gaps = shapely.distance(polygon, shapely.points([at for _, at, _ in occupied]))
+        motions = self.live.scene.mission.motions
+        for (what, at, robots), gap in zip(occupied, gaps.tolist(), strict=True):
+            blocked = [motions[robot.motion].blocked_by(kind) for robot in robots]
+            if all(b and gap < r.radius for b, r in zip(blocked, robots, strict=True)):
                 raise BadInput(
                     f"the obstacle would cover {what} at {show_point(at)}",
                     field="obstacle_location",
                     remedy="check the coordinates, or cancel the task first",
                 )
-        before = self._unreachable()
-        obstacle = Obstacle(id=event.obstacle, kind=event.kind, polygon=event.polygon)
-        live.scene.world.roadmap.add_obstacle(obstacle)
-        self._undo.append(event)
-        for what in self._unreachable() - before:
-            raise BadInput(
-                f"the obstacle would shut in {what}",
-                field="obstacle_location",
-                remedy="check the coordinates, or cancel the task first",
-            )
 
     def _occupied(self) -> Iterator[tuple[str, Point, list[Robot]]]:
         """Robots and open stops: what, where, and for whom it must stay free."""
-        state, mission = self.live.state, self.live.scene.mission
-        for robot in mission.robots:
+        for robot in self.live.scene.mission.robots:
             yield robot.id, self.live.pose(robot.id), [robot]
-        for id, task in state.tasks.items():
-            if id in state.completed:
-                continue
-            carrier = state.carrier(id)
-            able = [r for r in self._working() if r.can.get(task.type, 0.0) > 0]
-            if carrier:
-                able = [robot for robot in mission.robots if robot.id == carrier]
-            for stop in task.stops[-1:] if carrier else task.stops:
-                if able:
-                    yield f"the {stop.name} of task {id}", stop.at, able
+        for task, stops, able in self._open():
+            for stop in stops if able else ():
+                yield f"the {stop.name} of task {task.id}", stop.at, able
 
-    def _unreachable(self) -> set[str]:
-        """Open tasks that no robot which may do them reaches."""
+    def _open(self) -> Iterator[tuple[Task, tuple[Stop, ...], list[Robot]]]:
+        """Tasks that are not done, which of their stops are left, and who can serve those."""
         state = self.live.state
-        found = set()
         for id, task in state.tasks.items():
             if id in state.completed or id in state.stranded:
                 continue
             carrier = state.carrier(id)
-            if carrier:
-                robot = self.live.scene.mission.robot(carrier)
-                if not self._hangs_together(robot, [task.stops[-1].at]):
-                    found.add(f"the delivery of task {id}")
-                continue
             able = [r for r in self._working() if r.can.get(task.type, 0.0) > 0]
-            if able and not any(self._reaches(robot, task) for robot in able):
-                found.add(f"task {id}")
+            if carrier:
+                yield task, task.stops[-1:], [self.live.scene.mission.robot(carrier)]
+            else:
+                yield task, task.stops, able
+
+    def _shut_in(self) -> set[str]:
+        """Open tasks that nobody can do any more, and robots that can go nowhere."""
+        reach = Reach(self.live)
+        found, places = set(), list(self.live.scene.mission.places.values())
+        for task, stops, able in self._open():
+            points = [stop.at for stop in stops]
+            places += points
+            if able and not any(reach.all(robot, points) for robot in able):
+                found.add(f"task {task.id}")
+        for robot in self._working():
+            if places and not any(reach.all(robot, [at]) for at in places):
+                found.add(robot.id)
         return found
 
     # -- robots
@@ -321,21 +320,28 @@ class Trial:
         points = np.array([at], dtype=float)
         return float(world.roadmap.workspace.clearance(points, motion, limit)[0])
 
-    def _reaches(self, robot: Robot, task: Task) -> bool:
-        return self._hangs_together(robot, [stop.at for stop in task.stops])
 
-    def _hangs_together(self, robot: Robot, points: Sequence[Point]) -> bool:
-        """Whether a robot can drive from where it is to all of these points."""
-        world = self.live.scene.world
-        mode = world.mode_of[robot.id]
-        nodes, _, _ = world.roadmap.links(self.live.pose(robot.id), mode)
-        there = [world.roadmap.insert(point) for point in points]
-        if avoid := self.live.scene.rules.avoid:
-            costs = world.roadmap.travel(mode, there, nodes, avoid)
-            return bool(np.isfinite(costs).any(axis=1).all())
-        component = world.roadmap.components(mode)
-        here = {int(component[node]) for node in nodes}
-        return all(int(component[node]) in here for node in there)
+class Reach:
+    """Who can drive where in a live world, as long as it stays as it is."""
+
+    def __init__(self, live: Live) -> None:
+        self._live = live
+        self._parts: dict[tuple[Point, int], frozenset[int]] = {}
+
+    def all(self, robot: Robot, points: Sequence[Point]) -> bool:
+        """Whether a robot can drive from where it is to all of these points [m]."""
+        mode = self._live.scene.world.mode_of[robot.id]
+        parts = [self._around(at, mode) for at in (self._live.pose(robot.id), *points)]
+        return bool(frozenset.intersection(*parts))
+
+    def _around(self, at: Point, mode: int) -> frozenset[int]:
+        """The parts of the roadmap that a robot at a point [m] can drive to."""
+        if (at, mode) not in self._parts:
+            roadmap, avoid = self._live.scene.world.roadmap, self._live.scene.rules.avoid
+            nodes = list(roadmap.near(at, mode, avoid))
+            part = roadmap.components(mode, avoid)[nodes]
+            self._parts[at, mode] = frozenset(part.tolist())
+        return self._parts[at, mode]
 
 
 def _inside(at: Point, bounds: tuple[float, float, float, float], field: str) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -88,9 +89,10 @@ class Roadmap:
         self._sequence = Halton(workspace.bounds, rng)
         self._node_at: dict[Point, int] = {}
         self.version = 0  # rises whenever a cost or an edge changes
-        self._around: set[Point] = set()  # corner nodes of obstacles that were added
+        self._around: dict[Point, int] = {}  # corner nodes of obstacles that were added
+        self._gone: set[int] = set()  # nodes that were tried out and stand alone for good
         # Whether a sample joins two components is asked for every one of thousands.
-        self._components: dict[int, NDArray[np.int32]] = {}
+        self._components: dict[tuple[int, frozenset[str]], NDArray[np.int32]] = {}
         self._components_of = (-1, -1)
         begin = time.perf_counter()
         motions = [mode.motion for mode in modes]
@@ -100,6 +102,7 @@ class Roadmap:
         order = _along_curve(nodes)
         nodes = nodes[order]
         self._corners = np.flatnonzero(order >= self.sampled)
+        self._corner_tree = cKDTree(nodes[self._corners]) if len(self._corners) else None
         self.graph.add_nodes(nodes)
         sampled = time.perf_counter()
         pairs = _delaunay_edges(nodes)
@@ -129,17 +132,20 @@ class Roadmap:
             is_open |= self.graph.costs(m) < _core.UNREACHABLE
         return ends[is_open]
 
-    def components(self, mode: int) -> NDArray[np.int32]:
-        """Component (n,) of every node over the edges open in a mode."""
-        n = self.graph.size
+    def components(self, mode: int, avoid: frozenset[str] = frozenset()) -> NDArray[np.int32]:
+        """Component (n,) of every node over a mode's open edges that touch nothing to avoid."""
+        n, key = self.graph.size, (mode, avoid)
         if self._components_of != (self.version, n):
             self._components_of = (self.version, n)
             self._components.clear()
-        if mode not in self._components:
-            a, b = self.edges(mode).T
+        if key not in self._components:
+            is_open = self.graph.costs(mode) < _core.UNREACHABLE
+            if avoid:
+                is_open &= np.array(self.allowed(avoid), dtype=np.bool_)[self.graph.labels()]
+            a, b = self.graph.ends()[is_open].T
             matrix = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(n, n))
-            self._components[mode] = connected_components(matrix, directed=False)[1]
-        return self._components[mode]
+            self._components[key] = connected_components(matrix, directed=False)[1]
+        return self._components[key]
 
     def parts(self, mode: int) -> int:
         """How many parts the edges open in a mode fall into; nodes without such an edge are none.
@@ -184,17 +190,43 @@ class Roadmap:
         changed = self._refresh(obstacle)
         if self.params.corners:
             before = self.graph.edges
-            around = self._useful(self._corners_of(obstacle))
+            around = [(x, y) for x, y in self._useful(self._corners_of(obstacle)).tolist()]
             # An obstacle that comes back finds its corner nodes where it left them.
-            new = [tuple(at) not in self._around for at in around.tolist()]
-            self._around.update(map(tuple, around.tolist()))
-            self._append(around[new])
-            changed = np.concatenate([changed, np.arange(before, self.graph.edges, dtype=np.int32)])
+            again = self._revive([self._around[at] for at in around if at in self._around])
+            for at in around:
+                if at not in self._around:
+                    self._around[at] = self.graph.size
+                    self._append(np.array([at]))
+            new = np.arange(before, self.graph.edges, dtype=np.int32)
+            changed = np.concatenate([changed, again, new])
         return changed
 
     def remove_obstacle(self, id: str) -> NDArray[np.int32]:
         """Take an obstacle out; return the edges whose cost changed in some mode."""
         return self._refresh(self.workspace.remove(id))
+
+    @contextmanager
+    def trial(self) -> Iterator[None]:
+        """Try changes out: at the end everything costs again what it cost before.
+
+        Nodes that came meanwhile are left alone, without a way to them.
+        """
+        nodes, edges, version = self.graph.size, self.graph.edges, self.version
+        costs = [self.graph.costs(mode) for mode in range(len(self.modes))]
+        obstacles, node_at = dict(self.workspace.obstacles), dict(self._node_at)
+        try:
+            yield
+        finally:
+            self._node_at = node_at
+            self._gone.update(range(nodes, self.graph.size))
+            if self.version != version:
+                for id, obstacle in list(self.workspace.obstacles.items()):
+                    if obstacles.get(id) != obstacle:
+                        self.workspace.remove(id)
+                for id, obstacle in obstacles.items():
+                    if id not in self.workspace.obstacles:
+                        self.workspace.add(obstacle)
+                self._reset(costs, edges)
 
     def links(
         self, at: Point, mode: int, towards: Sequence[int] = ()
@@ -213,6 +245,14 @@ class Roadmap:
         costs = self._micro(a, b, self.modes[mode])
         return seen.tolist(), costs.tolist(), self.zones.labels(a, b).tolist()
 
+    def near(self, at: Point, mode: int, avoid: frozenset[str] = frozenset()) -> tuple[int, ...]:
+        """The node at a point; if there is none, those that a robot there can drive to straight."""
+        if at in self._node_at:
+            return (self._node_at[at],)
+        nodes, _, labels = self.links(at, mode)
+        allowed = self.allowed(avoid)
+        return tuple(node for node, label in zip(nodes, labels, strict=True) if allowed[label])
+
     def connect(self, wanted: Mapping[int, Sequence[int]]) -> None:
         """Sample on between components until, per mode, the wanted nodes hang together.
 
@@ -228,6 +268,25 @@ class Roadmap:
             count *= 2
 
     # -- inside
+
+    def _reset(self, costs: Sequence[NDArray[np.int64]], edges: int) -> None:
+        """Give edges their old costs, and close all that are newer."""
+        self.version += 1
+        every = np.arange(self.graph.edges, dtype=np.int32)
+        for mode, old in enumerate(costs):
+            new = np.full(len(every), _core.UNREACHABLE, dtype=np.int64)
+            new[:edges] = old
+            self.graph.set_costs(mode, every, new)
+
+    def _revive(self, nodes: Sequence[int]) -> NDArray[np.int32]:
+        """Open the edges of nodes that were only tried out so far; return those that changed."""
+        gone = self._gone.intersection(nodes)
+        if not gone:
+            return np.empty(0, dtype=np.int32)
+        self._gone -= gone
+        ends = self.graph.ends()
+        edges = np.flatnonzero(np.isin(ends, list(gone)).any(axis=1)).astype(np.int32)
+        return self._reprice(edges)
 
     def _apart(self, mode: int, nodes: Sequence[int]) -> bool:
         return len(set(self.components(mode)[list(nodes)].tolist())) > 1
@@ -269,6 +328,8 @@ class Roadmap:
         nodes = self.nodes()
         while True:
             near = self.graph.nearest(at[0], at[1], look)
+            if self._gone:
+                near = near[[node not in self._gone for node in near.tolist()]]
             a = np.repeat(at[None], len(near), axis=0)
             free = workspace.core.free(a, nodes[near], mode.radius, blocked).astype(np.bool_)
             seen = np.asarray(near[free], dtype=np.intp)
@@ -278,10 +339,9 @@ class Roadmap:
 
     def _sights(self, points: Array, nodes: NDArray[np.intp]) -> NDArray[np.int64]:
         """Pairs (m, 2) of each point's node and the corner nodes nearest to it."""
-        if not len(self._corners) or not len(points):
+        if self._corner_tree is None or not len(points):
             return np.empty((0, 2), dtype=np.int64)
-        tree = cKDTree(self.nodes()[self._corners])
-        _, near = tree.query(points, k=min(self.params.sights, len(self._corners)))
+        _, near = self._corner_tree.query(points, k=min(self.params.sights, len(self._corners)))
         near = self._corners[near.reshape(len(points), -1)]
         pairs = np.stack([np.repeat(nodes, near.shape[1]), near.ravel()], axis=1).astype(np.int64)
         different: NDArray[np.int64] = pairs[pairs[:, 0] != pairs[:, 1]]
@@ -351,7 +411,12 @@ class Roadmap:
         touched = np.flatnonzero(
             np.all((np.minimum(a, b) <= high) & (np.maximum(a, b) >= low), axis=1)
         ).astype(np.int32)
-        return touched[self._price(touched, a[touched], b[touched])]
+        return self._reprice(touched)
+
+    def _reprice(self, edges: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Price edges anew; return those whose cost changed in some mode."""
+        nodes, ends = self.nodes(), self.graph.ends()[edges]
+        return edges[self._price(edges, nodes[ends[:, 0]], nodes[ends[:, 1]])]
 
 
 @dataclass(frozen=True, slots=True)
