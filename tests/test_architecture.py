@@ -21,6 +21,7 @@ ROWS = (
     ("formats",),
     ("world",),
     ("allocate", "motion", "verify"),
+    ("state",),
     ("dispatch",),
     ("scene", "fleet", "store", "picture", "terminal"),
     ("commands",),

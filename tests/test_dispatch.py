@@ -23,14 +23,13 @@ from oath.dispatch import (
     Finish,
     Plan,
     Repair,
-    RobotState,
-    State,
     UpdateMap,
     advance,
 )
 from oath.errors import BadInput
 from oath.model import Mission, Route, RouteStop
 from oath.runtime import summarise
+from oath.state import RobotState, State
 
 DOOR = ((6.9, 3.9), (7.1, 3.9), (7.1, 6.1), (6.9, 6.1))
 
@@ -126,12 +125,14 @@ def started(t: float = 0.0) -> ev.MissionStarted:
 def test_a_mission_begins_with_a_round() -> None:
     after, actions = pure(state(), started())
     assert actions == (Allocate(),)
-    assert after == state(allocating=True)
+    assert after == state(allocating=True, rounds=1)
 
 
 def test_new_routes_are_planned_and_kept_ones_are_not() -> None:
     kept = state(
-        allocating=True, robots={"r1": RobotState(position=(1, 1), route=route("c")), "r2": idle()}
+        rounds=1,
+        allocating=True,
+        robots={"r1": RobotState(position=(1, 1), route=route("c")), "r2": idle()},
     )
     answer = allocated({"r1": route("c"), "r2": route("+a", "-a")}, b="waits for a robot")
     after, actions = pure(kept, answer)
@@ -220,7 +221,7 @@ def test_two_carried_tasks_strand_one_by_one() -> None:
     second, actions = pure(first, planned("r1", None, "b", "obstacle"))
     assert second.stranded.keys() == {"a", "b"}
     assert second.robots["r1"].route == ()
-    assert second.dirty
+    assert (first.rounds, second.rounds) == (1, 2)
     assert actions == ()
 
 
@@ -301,14 +302,16 @@ def test_the_clock_never_goes_back() -> None:
 
 def test_only_one_round_is_in_flight_and_changes_ask_for_another() -> None:
     on = state(
-        allocating=True, robots={"r1": RobotState(position=(1, 1), route=route("c")), "r2": idle()}
+        rounds=1,
+        allocating=True,
+        robots={"r1": RobotState(position=(1, 1), route=route("c")), "r2": idle()},
     )
     changed, actions = pure(on, served("r1", route("c")[0]))
     assert actions == ()
-    assert changed.dirty
+    assert changed.rounds == on.rounds + 1
     after, actions = pure(changed, allocated({"r1": route("c"), "r2": route("+a", "-a")}))
     assert actions == (Plan("r2", "allocated"), Allocate())
-    assert (after.allocating, after.dirty) == (True, False)
+    assert after.allocating
     # c was done while the round was computed.
     assert after.robots["r1"].route == ()
     check_partition(after)
@@ -441,7 +444,7 @@ class Chaos:
                     routes[one.id] = tuple(s for s in routes[one.id] if s.task != task_id)
                     routes[other.id] += moved
         return allocated(
-            routes, self.state.t, then.rounds + 1, **dict.fromkeys(open_, "waits for a robot")
+            routes, self.state.t, then.rounds, **dict.fromkeys(open_, "waits for a robot")
         )
 
 

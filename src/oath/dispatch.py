@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from oath.events import (
     Allocated,
@@ -30,123 +30,11 @@ from oath.events import (
     TaskAdded,
     TaskCancelled,
 )
-from oath.model import Mission, Obstacle, Point, Priority, Route, RouteStop, Stop, Task
+from oath.model import Obstacle, Point, Priority, Route, RouteStop, Stop
+from oath.state import State
 
 RECONSIDER = 0.05
 """Share by which a way must grow for an obstacle to ask for another assignment."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RobotState:
-    """Where a robot was last seen [m], what remains of its route, and the tasks it carries.
-
-    What it cannot deliver stays in its hands.
-    """
-
-    position: Point
-    route: Route = ()
-    carrying: tuple[str, ...] = ()
-    stale: bool = False
-    """The plan ends differently than the route; it is due anew after the next stop."""
-    left: float = 0.0
-    """What was planned less what was driven since [m]."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class State:
-    """Everything that the events so far say."""
-
-    t: float
-    """Mission clock [s]."""
-    tasks: Mapping[str, Task]
-    robots: Mapping[str, RobotState]
-    completed: frozenset[str] = frozenset()
-    stranded: Mapping[str, str] = field(default_factory=dict)
-    """Carried tasks that cannot be delivered, and why."""
-    failed: frozenset[str] = frozenset()
-    """Robots that are out of the mission."""
-    reconsiders: bool = False
-    """The allocator may change routes that are under way; else only idle robots get tasks."""
-    refused: frozenset[tuple[str, str]] = frozenset()
-    """(robot, task) pairs that turned out to have no plan."""
-    unassigned: Mapping[str, str] = field(default_factory=dict)
-    """Why tasks were left out of the last round."""
-    rounds: int = 0
-    allocating: bool = False
-    dirty: bool = False
-    """Something changed while an allocation was in flight."""
-    finished: bool = False
-    paused: frozenset[str] = frozenset()
-    """Robots that are told to hold; they keep their routes and get nothing new."""
-    obstacles: Mapping[str, Obstacle] = field(default_factory=dict)
-    """Everything that stands in the way and is known."""
-    hidden: Mapping[str, Obstacle] = field(default_factory=dict)
-    """What the mission says is there to be found."""
-    labels: frozenset[str] = frozenset()
-    """Every task label ever used."""
-    obstacle_ids: frozenset[str] = frozenset()
-    """Every obstacle id ever used."""
-    changes: int = 0
-    """How often tasks, priorities, obstacles or the robots' condition have changed."""
-    undo: tuple[tuple[AnyEvent, ...], ...] = ()
-    """For every command that is not undone what takes it back; () if nothing can."""
-    recording: bool = False
-    """The events that follow are what the last command does."""
-
-    @classmethod
-    def of(cls, mission: Mission, *, reconsiders: bool = False) -> State:
-        """The state before anything happened."""
-        obstacles = {obstacle.id: obstacle for obstacle in mission.map.obstacles}
-        return cls(
-            t=0.0,
-            tasks={task.id: task for task in mission.tasks},
-            robots={robot.id: RobotState(position=robot.start) for robot in mission.robots},
-            reconsiders=reconsiders,
-            obstacles={id: one for id, one in obstacles.items() if one.known},
-            hidden={id: one for id, one in obstacles.items() if not one.known},
-            labels=frozenset(task.id for task in mission.tasks),
-            obstacle_ids=frozenset(obstacles),
-        )
-
-    def carrier(self, task: str) -> str | None:
-        """The robot that has a task aboard."""
-        return next((id for id, robot in self.robots.items() if task in robot.carrying), None)
-
-    def urgent(self) -> tuple[str, ...]:
-        """Open tasks of high priority."""
-        return tuple(id for id in self.open_tasks() if self.tasks[id].priority == "high")
-
-    def deliverable(self, robot: str) -> tuple[str, ...]:
-        """What a robot carries and will deliver: neither stranded nor cancelled meanwhile."""
-        loads = self.robots[robot].carrying
-        return tuple(id for id in loads if id in self.tasks and id not in self.stranded)
-
-    def carried(self) -> frozenset[str]:
-        """Tasks that some robot has picked up and will deliver."""
-        return frozenset(task for robot in self.robots for task in self.deliverable(robot))
-
-    def open_tasks(self) -> tuple[str, ...]:
-        """Tasks that nobody has picked up, in their given order."""
-        begun = self.completed | self.carried() | self.stranded.keys()
-        return tuple(task for task in self.tasks if task not in begun)
-
-    def waiting(self) -> tuple[str, ...]:
-        """Open tasks that are in no robot's route."""
-        routed = {stop.task for robot in self.robots.values() for stop in robot.route}
-        return tuple(task for task in self.open_tasks() if task not in routed)
-
-    def unserved(self) -> dict[str, str]:
-        """Every task that is not done, and why."""
-        reasons = {**self.unassigned, **self.stranded}
-        for id in self.paused:
-            robot = self.robots[id]
-            held = {stop.task for stop in robot.route} | set(robot.carrying)
-            reasons |= dict.fromkeys(held, f"given to {id}, which is paused")
-        return {
-            task: reasons.get(task, "not finished")
-            for task in self.tasks
-            if task not in self.completed
-        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,12 +120,9 @@ def advance(state: State, event: AnyEvent) -> tuple[State, tuple[Action, ...]]:
         case RobotFailed():
             return _robot_failed(state, event)
         case RobotPaused():
-            return replace(state, paused=state.paused | {event.robot}), ()
+            return _robot_paused(state, event)
         case RobotResumed():
-            state = replace(state, paused=state.paused - {event.robot})
-            if state.robots[event.robot].route:
-                return state, (Plan(event.robot, "command"),)
-            return _allocate(state)
+            return _robot_resumed(state, event)
         case MissionFinished():
             return replace(state, finished=True), ()
         case Commanded():
@@ -317,10 +202,9 @@ def _with(state: State, robot: str, **changes: object) -> State:
 
 
 def _allocate(state: State) -> tuple[State, tuple[Action, ...]]:
-    """Ask for a round; at most one is in flight, and what changes meanwhile asks for another."""
-    if state.allocating:
-        return replace(state, dirty=True), ()
-    return replace(state, allocating=True, dirty=False), (Allocate(),)
+    """Ask for a round; at most one is in flight, and what it does not know asks for another."""
+    asked = replace(state, rounds=state.rounds + 1, allocating=True)
+    return asked, () if state.allocating else (Allocate(),)
 
 
 def _allocated(state: State, event: Allocated) -> tuple[State, tuple[Action, ...]]:
@@ -330,12 +214,12 @@ def _allocated(state: State, event: Allocated) -> tuple[State, tuple[Action, ...
     same = {robot for robot in changed if routes[robot][:1] == state.robots[robot].route[:1]}
     for robot in changed:
         state = _with(state, robot, route=routes[robot], stale=robot in same)
-    state = replace(state, allocating=False, rounds=event.round, unassigned=dict(event.unassigned))
+    state = replace(state, allocating=False, unassigned=dict(event.unassigned))
     # A route that was taken away is planned too: its robot must not drive on.
     actions: tuple[Action, ...] = tuple(
         Plan(robot, "allocated") for robot in changed if robot not in same
     )
-    if state.dirty:
+    if state.rounds > event.round:
         state, more = _allocate(state)
         return state, actions + more
     return state, actions + _finish_if_still(state)
@@ -386,13 +270,13 @@ def _planned(state: State, event: Planned) -> tuple[State, tuple[Action, ...]]:
     robot, task = state.robots[event.robot], event.unreachable
     if not robot.route:
         return state, _finish_if_still(state)
-    before = robot.left
     state = _with(state, event.robot, stale=False)
     if event.length is not None:
         state = _with(state, event.robot, left=event.length)
         drive: tuple[Action, ...] = (Drive(event.robot),) if event.robot not in state.paused else ()
-        longer = event.reason == "obstacle" and event.length > before * (1 + RECONSIDER)
-        if longer and state.reconsiders:
+        # What a stale plan was for says nothing about this one's length.
+        longer = robot.stale or event.length > robot.left * (1 + RECONSIDER)
+        if event.reason == "obstacle" and longer and state.reconsiders:
             state, more = _allocate(state)
             return state, drive + more
         return state, drive
@@ -492,6 +376,19 @@ def _robot_failed(state: State, event: RobotFailed) -> tuple[State, tuple[Action
     state = _with(state, event.robot, route=(), stale=False)
     state, more = _allocate(state)
     return state, (Plan(event.robot, "command"), *more)
+
+
+def _robot_paused(state: State, event: RobotPaused) -> tuple[State, tuple[Action, ...]]:
+    state = replace(state, paused=state.paused | {event.robot})
+    held = {stop.task for stop in state.robots[event.robot].route}
+    # It keeps its route, but what is urgent does not wait for it.
+    return _allocate(state) if held.intersection(state.urgent()) else (state, ())
+
+
+def _robot_resumed(state: State, event: RobotResumed) -> tuple[State, tuple[Action, ...]]:
+    state, more = _allocate(replace(state, paused=state.paused - {event.robot}))
+    on = (Plan(event.robot, "command"),) if state.robots[event.robot].route else ()
+    return state, (*on, *more)
 
 
 def _finish_if_still(state: State) -> tuple[Action, ...]:

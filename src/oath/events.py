@@ -37,7 +37,10 @@ class MissionStarted(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Allocated(Event):
-    """An allocation round ended; `routes` replaces the routes of all robots."""
+    """An allocation round ended; `routes` replaces the routes of all robots.
+
+    `round` counts how often one had been asked for when it began: it answers all of those.
+    """
 
     type: ClassVar[str] = "allocated"
     round: int

@@ -8,10 +8,10 @@ import numpy as np
 
 from oath.allocate import Allocator, Budget, ByPriority, checked
 from oath.commands import Command, Live, Trial
-from oath.dispatch import State
 from oath.events import AnyEvent, ObstacleAdded, ObstacleRemoved, TaskAdded
 from oath.model import Route
 from oath.scene import UnderWay, pose
+from oath.state import State
 
 ITERATIONS = 1000
 """Of the search for routes that the preview is based on: enough to name the robots."""

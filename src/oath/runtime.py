@@ -20,7 +20,6 @@ from oath.dispatch import (
     Finish,
     Plan,
     Repair,
-    State,
     UpdateMap,
     advance,
     failure,
@@ -39,10 +38,11 @@ from oath.events import (
     StopServed,
 )
 from oath.fleet import Fleet, Order
-from oath.model import Mission, Obstacle, Route, Task
+from oath.model import Mission, Obstacle, Point, Route, RouteStop, Task
 from oath.motion.planner import Planner, Service
 from oath.preview import preview
 from oath.scene import Scene, UnderWay, pose
+from oath.state import State
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,14 +157,13 @@ class Runtime:
         BadInput
             If one of them is not possible; then nothing has changed.
         """
+        self.advance(self.now)
         events = admit(self.live(), commands, source).events
         # Robots that must stand come to rest first: the log says where before it says why.
-        halting = [e.robot for e in events if isinstance(e, RobotPaused | RobotFailed)]
-        for robot in halting:
-            self._fleet.cancel(robot, at_once=True)
-        if halting:
-            self.advance(self.now)
-            events = admit(self.live(), commands, source).events
+        for event in events:
+            if isinstance(event, RobotPaused | RobotFailed):
+                self._fleet.cancel(event.robot, at_once=True)
+        self.advance(self.now)
         self._together(events)
         return events
 
@@ -235,7 +234,7 @@ class Runtime:
         return []
 
     def _update_map(self, obstacle: str) -> None:
-        """Bring an obstacle of the map in line with the state; of what came and went nothing is left."""
+        """Bring an obstacle of the map in line with the state: it may have come and gone."""
         roadmap, known = self.scene.world.roadmap, self.state.obstacles.get(obstacle)
         if known == roadmap.workspace.obstacles.get(obstacle):
             return
@@ -249,7 +248,7 @@ class Runtime:
         assignment = checked(ByPriority(self._allocator), problem, self._budget, self._rng)
         return Allocated(
             t=self.state.t,
-            round=self.state.rounds + 1,
+            round=self.state.rounds,
             seconds=time.perf_counter() - begin,
             routes=assignment.routes,
             unassigned=assignment.unassigned,
@@ -259,15 +258,25 @@ class Runtime:
         found = {}
         for id, robot in self.state.robots.items():
             if robot.route:
-                planner, at = self._planners[id], self._fleet.poses()[id].at
-                rest = planner.rest()
-                to_rest = math.dist(at, rest)
-                driven = math.dist(planner.position, at)
-                found[id] = UnderWay(max(planner.to_go() - driven, 0.0), rest, to_rest)
+                at = self._fleet.poses()[id].at
+                rest, on = self._planners[id].ahead()
+                at_work = self._at_work(id) and id not in self.state.paused
+                found[id] = UnderWay(rest, math.dist(at, rest), on, at_work)
         return found
 
+    def _at_work(self, robot: str) -> bool:
+        """Whether a robot has come to its next stop."""
+        route = self.state.robots[robot].route
+        return bool(route) and self._planners[robot].at_stop() == _own(route[0])
+
+    def _halt(self, robot: str, *, at_once: bool) -> Point:
+        """Return where a robot comes to rest that gets a new plan; what it works at goes on."""
+        if self._at_work(robot):
+            return self.state.robots[robot].position
+        return self._fleet.cancel(robot, at_once=at_once)
+
     def _plan(self, robot: str, reason: PlanReason) -> Planned:
-        at = self._fleet.cancel(robot, at_once=robot in self.state.failed)
+        at = self._halt(robot, at_once=robot in self.state.failed)
         begin = time.perf_counter()
         plan = self._planners[robot].begin(at, self._services(robot))
         return self._planned(robot, reason, plan.length, plan.blocked, begin)
@@ -276,7 +285,7 @@ class Runtime:
         planner = self._planners[robot]
         if obstacle is None or not planner.touches(obstacle):
             return []
-        at = self._fleet.cancel(robot, at_once=True)
+        at = self._halt(robot, at_once=True)
         begin = time.perf_counter()
         stale = self.state.robots[robot].stale
         plan = planner.begin(at, self._services(robot)) if stale else planner.replan(at)
@@ -286,6 +295,8 @@ class Runtime:
         self, robot: str, reason: PlanReason, length: float, blocked: int | None, begin: float
     ) -> Planned:
         seconds = time.perf_counter() - begin
+        if blocked is not None:
+            self._fleet.cancel(robot, at_once=False)  # what it works at may be in vain
         route = self.state.robots[robot].route
         return Planned(
             t=self.state.t,
@@ -306,7 +317,7 @@ class Runtime:
         letter = self.scene.world.roadmap.zones.at(stop.at)
         if stop is task.stops[-1]:
             letter |= {task.id}
-        return Service(at=stop.at, own=f"{task.id}@{stop.name}", letter=letter)
+        return Service(at=stop.at, own=_own(RouteStop(task=task.id, stop=stop.name)), letter=letter)
 
     def _drive(self, robot: str) -> None:
         entry = self.state.robots[robot].route[0]
@@ -317,6 +328,11 @@ class Runtime:
             service_time=self.state.tasks[entry.task].service_time,
         )
         self._fleet.send(robot, order)
+
+
+def _own(stop: RouteStop) -> str:
+    """The atom of a route's stop."""
+    return f"{stop.task}@{stop.stop}"
 
 
 def summarise(mission: Mission, state: State, events: Sequence[AnyEvent]) -> dict[str, Any]:
@@ -335,7 +351,7 @@ def summarise(mission: Mission, state: State, events: Sequence[AnyEvent]) -> dic
                 is_last = event.stop != "pickup"
                 per_robot[event.robot]["tasks"] += int(is_last)
             case Allocated():
-                rounds, allocation = event.round, allocation + event.seconds
+                rounds, allocation = rounds + 1, allocation + event.seconds
             case Planned():
                 planning += event.seconds
                 replans += int(event.reason != "allocated")

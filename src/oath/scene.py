@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from oath.allocate import Allocator, Budget, ByPriority, follow, plan_all, urgent
 from oath.allocate.problem import Aboard, Problem
-from oath.dispatch import State
 from oath.errors import BadInput
 from oath.model import Assignment, Mission, Point, Robot, Route, RouteStop, Stop
 from oath.motion.mission_automaton import Rules, compile_rules
+from oath.state import State
 from oath.world.passages import missed
 from oath.world.roadmap import Params, World, build
 from oath.world.travel import TravelCosts
@@ -83,19 +83,22 @@ def require_reachable(scene: Scene) -> None:
 
 @dataclass(frozen=True, slots=True)
 class UnderWay:
-    """A robot that is driving to its next stop.
+    """A robot on its way to its next stop.
 
     Attributes
     ----------
-    to_go
-        How far it is to the stop [m].
     rest, to_rest
         Where its current move ends [m], and how far that is [m]: there it can turn.
+    on
+        How far it is from there to the stop [m].
+    at_work
+        It is at the stop already.
     """
 
-    to_go: float
     rest: Point
     to_rest: float
+    on: float
+    at_work: bool
 
 
 def pose(
@@ -107,27 +110,13 @@ def pose(
     completes it soonest if it turns where its current move ends, whatever else was its next stop.
     """
     first: dict[str, Route] = {}
-    if under_way and (tasks := _pressing(state)):
+    busy = {state.robots[id].route[0].task for id, way in under_way.items() if way.at_work}
+    if under_way and (tasks := [id for id in state.urgent() if id not in busy]):
         turning = _Posed(scene, state, under_way, tasks, None).problem()
         index = {task: p for p, task in enumerate(turning.tasks)}
         first = dict(urgent(turning, [index[task] for task in tasks]).routes)
     given = {stop.task for route in first.values() for stop in route}
     return _Posed(scene, state, under_way, given, first).problem()
-
-
-def _pressing(state: State) -> list[str]:
-    """Urgent tasks but for those at which a robot is at work this moment."""
-    at_work = {robot.route[0].task for id, robot in state.robots.items() if _serves(state, id)}
-    return [task for task in state.urgent() if task not in at_work]
-
-
-def _serves(state: State, robot: str) -> bool:
-    """Whether a robot is at work at its next stop."""
-    route = state.robots[robot].route
-    if not route or robot in state.paused:
-        return False
-    stop = state.tasks[route[0].task].stop(route[0].stop)
-    return stop.at == state.robots[robot].position
 
 
 _RANK = {"high": 1, "normal": 0, "low": -1}
@@ -225,7 +214,7 @@ class _Posed:
         if robot in state.paused:
             return rest
         next_stop = rest[:1] if rest[:1] == state.robots[robot].route[:1] else ()
-        if _serves(state, robot):
+        if robot in self.under_way and self.under_way[robot].at_work:
             first = next_stop + (self.first or {}).get(robot, ())
         elif self.first is None:
             return ()
@@ -236,7 +225,8 @@ class _Posed:
         return first or next_stop
 
     def _previous(self, robot: str, fixed: Route) -> Route:
-        return fixed + tuple(stop for stop in self._rest(robot) if stop not in fixed)
+        rest = self.state.robots[robot].route if self.first is None else self._rest(robot)
+        return fixed + tuple(stop for stop in rest if stop not in fixed)
 
     def _stop(self, stop: RouteStop) -> Stop:
         return self.state.tasks[stop.task].stop(stop.stop)
@@ -274,7 +264,7 @@ class _Posed:
             length = way.to_rest
             places = [self._location(way.rest), *places]
         elif way is not None:
-            length = way.to_go
+            length = way.to_rest + way.on
         length += sum(cost[self._mode(robot), a, b] for a, b in pairwise(places))
         service = sum(self.state.tasks[stop.task].service_time for stop in route)
         return float(length / robot.speed + service)

@@ -16,9 +16,9 @@ from oath.allocate import ALLOCATORS, Budget, Greedy, Kam, Kan, Oath, Problem, c
 from oath.allocate.clustering import count, kmeans
 from oath.allocate.insertion import best_places
 from oath.allocate.kan import nearest_neighbour, to_centroids
-from oath.dispatch import State
 from oath.model import Assignment
 from oath.scene import pose, prepare
+from oath.state import State
 from oracles import path_length
 
 MISSIONS = Path(__file__).parents[2] / "missions"

@@ -12,9 +12,9 @@ from oath.bench import Row, markdown, study
 from oath.bench.clusters import scene, spread
 from oath.bench.shortest import exact_lengths
 from oath.bench.tuning import sweep
-from oath.dispatch import State
 from oath.model import Map, Motion
 from oath.scene import pose
+from oath.state import State
 from oath.world.workspace import Mode
 
 SMALLEST = {

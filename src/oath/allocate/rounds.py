@@ -17,8 +17,11 @@ from oath.allocate.contract import (
     to_route,
     with_routes,
 )
-from oath.allocate.problem import Problem
+from oath.allocate.problem import Aboard, Problem
 from oath.model import Assignment, Route, RouteStop
+
+TIE = 1e-6
+"""Robots that complete a task within this time of each other are equally soon [s]."""
 
 
 @dataclass(slots=True)
@@ -37,9 +40,13 @@ class _Fleet:
 
     def serve(self, robot: int, task: int, stop: str) -> None:
         """Send a robot to a stop of a task and let it work there."""
-        problem, there = self.problem, stop_location(self.problem, task, stop)
+        self.go(robot, stop_location(self.problem, task, stop), self.problem.service_time[task])
+
+    def go(self, robot: int, there: int, service: float) -> None:
+        """Send a robot to a location and let it work there for some time [s]."""
+        problem = self.problem
         travel = problem.cost[problem.mode[robot], self.at[robot], there]
-        self.time[robot] += travel / problem.speed[robot] + problem.service_time[task]
+        self.time[robot] += travel / problem.speed[robot] + service
         self.at[robot] = there
 
 
@@ -117,7 +124,9 @@ def urgent(problem: Problem, tasks: list[int]) -> Assignment:
     """Give each task to the robot that completes it soonest, before anything else that it does.
 
     Tasks are handled in the order of their indices; a robot that got one is free again where and
-    when that one ends. Each is done on its own, so a robot needs room for one.
+    when that one ends. Each is done on its own, so a robot needs room for one: if it has none, it
+    delivers first what lets it begin soonest. Of robots that are equally soon, the one that is to
+    do the task already keeps it.
 
     Parameters
     ----------
@@ -131,21 +140,27 @@ def urgent(problem: Problem, tasks: list[int]) -> Assignment:
         Tasks that are not asked for are in neither.
     """
     fleet = _Fleet.now(problem)
-    full = problem.capacity <= [len(loads) for loads in problem.aboard]
-    able = problem.feasible() & (~full[:, None] | problem.visit)
+    aboard = [list(loads) for loads in problem.aboard]
+    able = problem.feasible()
     routes: dict[str, Route] = dict.fromkeys(problem.robots, ())
     missed = []
     given = np.zeros(len(problem.robots), dtype=np.int32)
     for task in sorted(tasks):
         able[given >= problem.max_tasks] = False
-        pickup, delivery = problem.pickup[task], problem.delivery[task]
-        to_pickup = problem.cost[problem.mode, fleet.at, pickup]
-        on = problem.cost[problem.mode, pickup, delivery] * (not problem.visit[task])
-        end = np.where(able[:, task], fleet.time + (to_pickup + on) / problem.speed, np.inf)
-        robot = int(np.argmin(end)) if end.size else -1
-        if robot < 0 or not np.isfinite(end[robot]):
+        ends = np.full(len(problem.robots), np.inf)
+        unload: dict[int, Aboard | None] = {}
+        for robot in np.flatnonzero(able[:, task]).tolist():
+            ends[robot], unload[robot] = _soonest(fleet, robot, aboard[robot], task)
+        best = float(ends.min()) if ends.size else np.inf
+        if not np.isfinite(best):
             missed.append(task)
             continue
+        soon = np.flatnonzero(ends <= best + TIE).tolist()
+        robot = next((r for r in soon if _holds(problem, r, task)), soon[0])
+        if load := unload[robot]:
+            fleet.go(robot, load.delivery, load.service_time)
+            aboard[robot].remove(load)
+            routes[problem.robots[robot]] += (RouteStop(task=load.task, stop="delivery"),)
         names = stop_names(problem, task)
         for name in names:
             fleet.serve(robot, task, name)
@@ -153,6 +168,28 @@ def urgent(problem: Problem, tasks: list[int]) -> Assignment:
         routes[problem.robots[robot]] += to_route(problem, [(task, name) for name in names])
     left = replace(problem, max_tasks=problem.max_tasks - given)
     return Assignment(routes=routes, unassigned=reasons(left, missed))
+
+
+def _soonest(
+    fleet: _Fleet, robot: int, aboard: list[Aboard], task: int
+) -> tuple[float, Aboard | None]:
+    """When a robot can complete a task [s from now], and what it must deliver before, if any."""
+    problem, at = fleet.problem, int(fleet.at[robot])
+    cost, speed = problem.cost[problem.mode[robot]], float(problem.speed[robot])
+    pickup, delivery = int(problem.pickup[task]), int(problem.delivery[task])
+    then = float(fleet.time[robot] + cost[pickup, delivery] * (not problem.visit[task]) / speed)
+    if problem.visit[task] or len(aboard) < problem.capacity[robot]:
+        return then + float(cost[at, pickup]) / speed, None
+    ends = [
+        float(cost[at, load.delivery] + cost[load.delivery, pickup]) / speed + load.service_time
+        for load in aboard
+    ]
+    first = int(np.argmin(ends))
+    return then + ends[first], aboard[first]
+
+
+def _holds(problem: Problem, robot: int, task: int) -> bool:
+    return any(stop.task == problem.tasks[task] for stop in problem.previous[robot])
 
 
 def follow(problem: Problem, robot: int, stops: Route) -> tuple[float, float, int]:

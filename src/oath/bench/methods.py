@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from oath.allocate import ALLOCATORS, Problem, follow
 from oath.bench.study import Row
-from oath.dispatch import State
 from oath.model import Assignment, Mission
 from oath.scene import pose, prepare
+from oath.state import State
 from oath.world.roadmap import Params
 
 if TYPE_CHECKING:

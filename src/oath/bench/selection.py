@@ -17,8 +17,8 @@ from oath.bench import paper
 from oath.bench.figures import COLOURS, plain_ticks, sheet, style
 from oath.bench.sampling import grouped
 from oath.bench.study import Case, Row, Study
-from oath.dispatch import State
 from oath.scene import pose, prepare
+from oath.state import State
 from oath.world.roadmap import Params
 
 if TYPE_CHECKING:

@@ -8,11 +8,11 @@ from typing import Annotated, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from oath.dispatch import State
 from oath.errors import BadInput, did_you_mean
 from oath.events import AnyEvent
 from oath.model import Point
 from oath.scene import Scene
+from oath.state import State
 
 Name = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=64)]
 """The name of something: a task's label, a place, a robot, an obstacle."""

@@ -29,7 +29,10 @@ class Fleet(Protocol):
     """
 
     def send(self, robot: str, order: Order) -> None:
-        """Give a robot its next order; it begins where the robot comes to rest."""
+        """Give a robot its next order; it begins where the robot comes to rest.
+
+        A robot that is at work at the same stop already, and need not move, works on.
+        """
 
     def cancel(self, robot: str, *, at_once: bool) -> Point:
         """Drop a robot's order; return where it comes to rest [m].

@@ -126,8 +126,10 @@ class SimFleet:
             self._look_around(body)
 
     def send(self, robot: str, order: Order) -> None:
-        """Give a robot its next order; it begins where the robot comes to rest."""
+        """Give a robot its next order, see `Fleet`."""
         body = self._bodies[robot]
+        if body.order is not None and replace(body.order, path=()) == order and not body.path:
+            return  # it is at work there already
         body.order, body.path = order, order.path
         if body.move is None:
             self._go_on(body)

@@ -130,26 +130,24 @@ class Planner:
             points[-1] = self._services[self._leg].at
         return points
 
-    def to_go(self) -> float:
-        """How far it is to the current leg's stop [m], from where the robot was last seen."""
-        way = self._ahead()
-        return float(np.hypot(*np.diff(way, axis=0).T).sum())
+    def ahead(self) -> tuple[Point, float]:
+        """Where a robot that drives along the plan ends its current move, and how far it is on [m].
 
-    def rest(self) -> Point:
-        """Where a robot that drives along the plan ends its current move [m]."""
+        The way on is that from there to the current leg's stop.
+        """
+        leg = self._plan.legs[0] if self._plan.legs else np.array([self.position])
         if self._joins is not None:
-            return self._joins
-        way = self._ahead()
-        at = way[1] if len(way) > 1 else way[0]
-        return float(at[0]), float(at[1])
+            return self._joins, _length(leg)
+        here = int(np.argmin(np.hypot(*(leg - np.array([self.position])).T)))
+        on = leg[here + 1 :] if here + 1 < len(leg) else leg[here:]
+        return (float(on[0, 0]), float(on[0, 1])), _length(on)
 
-    def _ahead(self) -> Array:
-        """What is left of the current leg, from the waypoint where the robot was last seen."""
-        here = np.array([self.position])
-        if not self._plan.legs:
-            return here
-        way = self._plan.legs[0]
-        return way[int(np.argmin(np.hypot(*(way - here).T))) :]
+    def at_stop(self) -> str | None:
+        """The atom of the current leg's stop, if the robot has come to it."""
+        if self._joins is not None or not self._plan.legs:
+            return None
+        stop = self._services[self._leg]
+        return stop.own if stop.at == self.position else None
 
     def moved(self, to: Point) -> None:
         """The robot drove straight from where it was to a point [m]."""
@@ -239,8 +237,11 @@ class Planner:
 
 def _plan(legs: tuple[Array, ...]) -> Plan:
     """The plan along these legs."""
-    length = sum(float(np.hypot(*np.diff(leg, axis=0).T).sum()) for leg in legs)
-    return Plan(length=length, legs=legs)
+    return Plan(length=sum(map(_length, legs)), legs=legs)
+
+
+def _length(way: Array) -> float:
+    return float(np.hypot(*np.diff(way, axis=0).T).sum())
 
 
 def _distinct(way: Array) -> Array:

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import Delaunay, QhullError, cKDTree
+from scipy.spatial import cKDTree
 
 from oath import _core
 from oath.model import Mission, Obstacle, Point
+from oath.world.edges import along_curve, delaunay_edges, unique
 from oath.world.halton import Density, Halton, Sampling, sample
 from oath.world.workspace import Mode, Workspace, Zones, corners, polygon_corners
 
@@ -99,15 +100,15 @@ class Roadmap:
         nodes = sample(workspace, motions, params.points, params.density, rng, params.sampling)
         self.sampled = len(nodes)
         nodes = np.concatenate([nodes, self._useful(corner_points)])
-        order = _along_curve(nodes)
+        order = along_curve(nodes)
         nodes = nodes[order]
         self._corners = np.flatnonzero(order >= self.sampled)
         self._corner_tree = cKDTree(nodes[self._corners]) if len(self._corners) else None
         self.graph.add_nodes(nodes)
         sampled = time.perf_counter()
-        pairs = _delaunay_edges(nodes)
+        pairs = delaunay_edges(nodes)
         sights = self._sights(nodes[self._corners], self._corners)
-        pairs = _unique(np.concatenate([pairs, sights]), len(nodes))
+        pairs = unique(np.concatenate([pairs, sights]), len(nodes))
         triangulated = time.perf_counter()
         self._add_edges(pairs)
         self.seconds = Seconds(
@@ -364,7 +365,7 @@ class Roadmap:
             new = np.array([self.graph.size - 1])
             pairs = np.stack([np.repeat(new, len(joined)), joined], axis=1)
             pairs = np.concatenate([pairs, self._sights(at[None], new)])
-            pairs = _unique(pairs, self.graph.size)
+            pairs = unique(pairs, self.graph.size)
             self._add_edges(pairs)
 
     def _joins(self, seen: Sequence[NDArray[np.intp]]) -> bool:
@@ -477,32 +478,3 @@ def _mission_corners(
         for radius in sorted({mode.radius for mode in modes})
     ]
     return np.concatenate(parts)
-
-
-def _delaunay_edges(nodes: Array) -> NDArray[np.int64]:
-    """Every edge (m, 2) of the Delaunay triangulation once, hull edges included."""
-    try:
-        triangles = Delaunay(nodes).simplices.astype(np.int64)
-    except (QhullError, ValueError):  # fewer than three points, or all on a line
-        order = np.lexsort(nodes.T)
-        return np.stack([order[:-1], order[1:]], axis=1)
-    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    return _unique(pairs, len(nodes))
-
-
-def _unique(pairs: NDArray[np.int64], n: int) -> NDArray[np.int64]:
-    """Undirected pairs (m, 2) of n nodes, each once and sorted."""
-    codes = np.unique(pairs.min(axis=1) * n + pairs.max(axis=1))
-    return np.stack(np.divmod(codes, n), axis=1)
-
-
-def _along_curve(nodes: Array) -> NDArray[np.intp]:
-    """Order nodes along a Z-curve, so that neighbours on the map are neighbours in memory."""
-    if not len(nodes):
-        return np.empty(0, dtype=np.intp)
-    low = nodes.min(axis=0)
-    size = max(float((nodes.max(axis=0) - low).max()), 1e-9)
-    cells = ((nodes - low) / size * 0xFFFF).astype(np.uint64)
-    for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
-        cells = (cells | (cells << np.uint64(shift))) & np.uint64(mask)
-    return np.argsort(cells[:, 0] | (cells[:, 1] << np.uint64(1)), kind="stable")
