@@ -28,7 +28,8 @@ ROWS = (
     ("instruct", "preview"),
     ("runtime",),
     ("", "bench"),
-    ("cli", "service"),
+    ("service",),
+    ("cli",),
 )
 """The rooms from bottom to top; "" is the package itself, which puts the others together."""
 

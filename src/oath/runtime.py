@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -37,7 +37,7 @@ from oath.events import (
     RobotPaused,
     StopServed,
 )
-from oath.fleet import Fleet, Order
+from oath.fleet import Fleet, Order, Pose
 from oath.model import Mission, Obstacle, Point, Route, RouteStop, Task
 from oath.motion.planner import Planner, Service
 from oath.preview import preview
@@ -132,9 +132,26 @@ class Runtime:
 
     def advance(self, until: float = math.inf) -> None:
         """Let everything happen that happens until some time [s]; by default, all there is."""
-        while due := self._fleet.events(until):
-            self._apply(due)
-        self.now = max(self.now, self.state.t, until if until < math.inf else 0.0)
+        while self.step(until):
+            pass
+
+    def step(self, until: float = math.inf) -> bool:
+        """Let the next thing happen if it does until some time [s]; say whether it did."""
+        due = self._fleet.events(until)
+        self._apply(due)
+        reached = until if not due and until < math.inf else 0.0
+        self.now = max(self.now, self.state.t, reached)
+        return bool(due)
+
+    def poses(self) -> Mapping[str, Pose]:
+        """Where every robot is now."""
+        return self._fleet.poses()
+
+    def ways(self) -> dict[str, list[Point]]:
+        """What robots will drive to their next stops [m], from where they were last seen."""
+        return {
+            id: self._planners[id].way() for id, robot in self.state.robots.items() if robot.route
+        }
 
     def live(self) -> Live:
         """The mission as it is now."""

@@ -24,6 +24,7 @@ from oath.cli.options import (
     weight_option,
 )
 from oath.cli.talk import acts, chat, interpret
+from oath.cli.serve import serve
 from oath.errors import OathError
 from oath.terminal import (
     counting,
@@ -342,6 +343,7 @@ def verify(mission: Path, events: Path, as_json: bool) -> None:
 
 main.add_command(interpret)
 main.add_command(chat)
+main.add_command(serve)
 
 
 @main.command(

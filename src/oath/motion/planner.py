@@ -142,6 +142,12 @@ class Planner:
         on = leg[here + 1 :] if here + 1 < len(leg) else leg[here:]
         return (float(on[0, 0]), float(on[0, 1])), _length(on)
 
+    def way(self) -> list[Point]:
+        """What is left of the current leg's waypoints [m], from where the robot was last seen."""
+        leg = self._plan.legs[0] if self._plan.legs else np.array([self.position])
+        here = int(np.argmin(np.hypot(*(leg - np.array([self.position])).T)))
+        return [(float(x), float(y)) for x, y in leg[here:]]
+
     def at_stop(self) -> str | None:
         """The atom of the current leg's stop, if the robot has come to it."""
         if self._joins is not None or not self._plan.legs:

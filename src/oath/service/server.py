@@ -1,0 +1,246 @@
+"""Puts the server together and runs it until it is told to stop."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import uvicorn
+
+from oath.allocate import Allocator, Budget
+from oath.errors import BadInput
+from oath.events import AnyEvent, MissionStarted, Moved, ObstacleFound, StopServed
+from oath.fleet.sim import SimFleet
+from oath.instruct import Interpreter
+from oath.model import Point
+from oath.runtime import Runtime
+from oath.scene import Scene
+from oath.service.app import create
+from oath.service.auth import Access, Pace
+from oath.service.feed import Feed
+from oath.service.history import EVERY, History
+from oath.service.journal import Memory
+from oath.service.live import MESSAGE
+from oath.service.metrics import Metrics
+from oath.service.owner import Happen, Owner
+from oath.service.snapshot import Moment
+from oath.service.talk import Talks
+
+LAST_WORDS = 0.3
+"""Clients have so long to hear how a mission ended before the server goes [s]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Running:
+    """What a server runs: a mission made ready, and who assigns its tasks."""
+
+    scene: Scene
+    name: str
+    allocator: Allocator
+    budget: Budget
+    seed: int
+    interpreter: Callable[[], Interpreter]
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """Return a socket that listens; port 0 takes a free one.
+
+    Raises
+    ------
+    BadInput
+        If the address cannot be had.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((host, port))
+        listener.listen(128)
+    except OSError as error:
+        listener.close()
+        raise BadInput(
+            f"{host}:{port} cannot be had: {error.strerror}",
+            field="--port",
+            remedy="choose another port, or 0 for any",
+        ) from None
+    return listener
+
+
+def serve(
+    running: Running,
+    listener: socket.socket,
+    access: Access,
+    *,
+    speed: float = 1.0,
+    until_done: bool = False,
+    rate: float = 100.0,
+    on_ready: Callable[[], None] = lambda: None,
+) -> None:
+    """Run a mission and its server until SIGINT, SIGTERM or, if so wanted, its last delivery.
+
+    Parameters
+    ----------
+    running
+        The mission.
+    listener
+        Where to listen.
+    access
+        Who is let in.
+    speed
+        Mission seconds per second.
+    until_done
+        Stop once every task is done or has a reason why not.
+    rate
+        So many requests each client may make [1/s].
+    on_ready
+        Called once requests are answered.
+
+    Raises
+    ------
+    OathError, OSError
+        If the mission cannot begin, or had to stop.
+    """
+    asyncio.run(_Server(running, access, speed, until_done, rate).serve(listener, on_ready))
+
+
+class _Server:
+    """The event loop's side of a running server: hands what the mission tells to the feed."""
+
+    def __init__(
+        self, running: Running, access: Access, speed: float, until_done: bool, rate: float
+    ) -> None:
+        self._running, self._access, self._rate = running, access, rate
+        mission = running.scene.mission
+        history = History(mission, reconsiders=running.allocator.reconsiders)
+        self._feed = Feed(running.scene, history)
+        self._owner = Owner(Memory, self._begin, self, speed=speed, until_done=until_done)
+        self._uvicorn: _Uvicorn | None = None
+        self._failure: BaseException | None = None
+
+    async def serve(self, listener: socket.socket, on_ready: Callable[[], None]) -> None:
+        self._loop = asyncio.get_running_loop()
+        await asyncio.to_thread(self._owner.open)
+        try:
+            metrics = Metrics()
+            talks = Talks(self._owner, self._running.interpreter)
+            pace = Pace(self._rate, 2 * self._rate)
+            app = create(self._feed, self._owner, talks, self._access, pace, metrics)
+            config = uvicorn.Config(
+                app,
+                log_level="warning",
+                access_log=False,
+                lifespan="off",
+                server_header=False,
+                proxy_headers=False,
+                ws="websockets-sansio",
+                ws_max_size=MESSAGE,
+                ws_per_message_deflate=False,
+                timeout_graceful_shutdown=3,
+                timeout_keep_alive=30,
+            )
+            self._uvicorn = _Uvicorn(config)
+            on_ready()
+            await self._uvicorn.serve(sockets=[listener])
+        finally:
+            await asyncio.to_thread(self._owner.stop)
+        if self._failure is not None:
+            raise self._failure
+
+    # -- called in the mission's thread
+
+    def _begin(self, events: Sequence[AnyEvent], happen: Happen) -> Runtime:
+        return begin(self._running, events, self._feed.history, happen)
+
+    def happened(self, events: Sequence[AnyEvent], at: float) -> None:
+        self._hand(lambda: self._feed.happened(events, at))
+
+    def moved(self, poses: bytes) -> None:
+        self._hand(lambda: self._feed.moved(poses))
+
+    def stands(self, moment: Moment) -> None:
+        self._hand(lambda: self._feed.stands(moment))
+
+    def ended(self, failure: BaseException | None) -> None:
+        self._failure = failure
+        self._hand(self._end)
+
+    def _hand(self, news: Callable[[], None]) -> None:
+        with contextlib.suppress(RuntimeError):  # the loop is closed: nobody listens any more
+            self._loop.call_soon_threadsafe(news)
+
+    def _end(self) -> None:
+        self._feed.end()
+        if self._uvicorn is not None:
+            self._loop.call_later(LAST_WORDS, setattr, self._uvicorn, "should_exit", True)
+
+
+class _Uvicorn(uvicorn.Server):
+    """Stops at a signal without passing it on: a server that is told to stop has done well."""
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        loop = asyncio.get_running_loop()
+        for signal in uvicorn.server.HANDLED_SIGNALS:
+            loop.add_signal_handler(signal, self.handle_exit, signal, None)
+        try:
+            yield
+        finally:
+            for signal in uvicorn.server.HANDLED_SIGNALS:
+                loop.remove_signal_handler(signal)
+
+
+def begin(
+    running: Running, events: Sequence[AnyEvent], history: History, happen: Happen
+) -> Runtime:
+    """Begin a mission, or resume it after these events, its robots where they were last seen.
+
+    Parameters
+    ----------
+    running
+        The mission.
+    events
+        What the journal holds.
+    history
+        Takes note of these events.
+    happen
+        What new events must pass through before they are applied.
+    """
+    mission = running.scene.mission
+    positions: dict[str, Point] = {}
+    found = set()
+    for event in events:
+        match event:
+            case Moved():
+                positions[event.robot] = event.to
+            case StopServed():
+                positions[event.robot] = event.at
+            case ObstacleFound():
+                found.add(event.obstacle)
+            case _:
+                pass
+    now = max((event.t for event in events), default=0.0)
+    runtime = Runtime(
+        running.scene,
+        SimFleet(mission, now=now, positions=positions, found=found),
+        name=running.name,
+        allocator=running.allocator,
+        budget=running.budget,
+        seed=running.seed,
+        journal=happen,
+    )
+    if not events:
+        runtime.start()
+        return runtime
+
+    def watched() -> Iterator[AnyEvent]:
+        for n, event in enumerate(events, 1):
+            yield event
+            history.add([event])
+            if n % EVERY == 0:
+                history.stands(runtime.state)
+
+    runtime.resume(watched())
+    return runtime
