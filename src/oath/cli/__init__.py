@@ -23,8 +23,8 @@ from oath.cli.options import (
     seed_option,
     weight_option,
 )
-from oath.cli.talk import acts, chat, interpret
 from oath.cli.serve import serve
+from oath.cli.talk import acts, chat, interpret
 from oath.errors import OathError
 from oath.terminal import (
     counting,

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from oath.commands import Live
+    from oath.instruct import Dialogue, Interpreter, Reply
 
 from oath.cli.options import (
     allocator_option,
@@ -111,7 +116,16 @@ def serve(
         )
 
 
-def _interpreter():
-    from oath.instruct.offline import Offline
-
+def _interpreter() -> Interpreter:
+    try:
+        from oath.instruct.offline import Offline
+    except ModuleNotFoundError:
+        return _Deaf()
     return Offline()
+
+
+class _Deaf:
+    def interpret(self, dialogue: Dialogue, live: Live) -> Reply:
+        from oath.instruct import Reply
+
+        return Reply(status="clarification", message="Words are not understood yet.")

@@ -131,7 +131,7 @@ async def _body(headers: Headers, receive: Receive) -> bytes | None:
     body = b""
     while True:
         message = await receive()
-        body += message.get("body", b"")
+        body += bytes(message.get("body", b""))
         if len(body) > BODY:
             return None
         if not message.get("more_body"):

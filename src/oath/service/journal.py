@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 from oath.events import AnyEvent
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a command was answered, and the sequence numbers of its own events."""
+
+    events: range
+    value: Any
 
 
 class Memory:
@@ -12,22 +22,25 @@ class Memory:
 
     def __init__(self) -> None:
         self._events: list[AnyEvent] = []
-        self._ids: dict[str, int] = {}
+        self._answers: dict[str, Answer] = {}
 
-    def append(self, events: Sequence[AnyEvent], *, id: str | None = None) -> int:
-        """Write events that happen together; return the number of the last."""
+    def append(
+        self, events: Sequence[AnyEvent], *, id: str | None = None, answer: object = None
+    ) -> range:
+        """Store events that happen together; return their sequence numbers."""
+        seqs = range(len(self._events), len(self._events) + len(events))
         self._events += events
         if id is not None:
-            self._ids[id] = len(self._events) - 1
-        return len(self._events) - 1
+            self._answers[id] = Answer(seqs, answer)
+        return seqs
 
-    def find(self, id: str) -> int | None:
-        """The number that `append` returned for this id, if it was used."""
-        return self._ids.get(id)
+    def replay(self, since: int = 0) -> list[AnyEvent]:
+        """Return the events from a sequence number on."""
+        return self._events[since:]
 
-    def replay(self) -> Iterator[AnyEvent]:
-        """All events from the first."""
-        return iter(list(self._events))
+    def known(self, id: str) -> Answer | None:
+        """Return what was answered to the command with this id; None if there was none."""
+        return self._answers.get(id)
 
     def close(self) -> None:
-        """Nothing more will be written."""
+        """Nothing more will be stored."""

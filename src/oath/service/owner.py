@@ -8,7 +8,7 @@ import queue
 import struct
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
@@ -19,6 +19,7 @@ from oath.events import AnyEvent, Commanded, RobotFailed
 from oath.runtime import Runtime
 from oath.service.clock import Clock
 from oath.service.history import EVERY
+from oath.service.journal import Answer
 from oath.service.snapshot import Moment
 
 T = TypeVar("T")
@@ -39,17 +40,19 @@ _log = logging.getLogger(__name__)
 class Journal(Protocol):
     """Where events are kept."""
 
-    def append(self, events: Sequence[AnyEvent], *, id: str | None = None) -> int:
-        """Write events that happen together, durably; return the number of the last."""
+    def append(
+        self, events: Sequence[AnyEvent], *, id: str | None = None, answer: object = None
+    ) -> range:
+        """Store events that happen together, all or none; return their sequence numbers."""
 
-    def replay(self) -> Iterable[AnyEvent]:
-        """All events from the first."""
+    def replay(self, since: int = 0) -> list[AnyEvent]:
+        """Return the events from a sequence number on."""
 
-    def find(self, id: str) -> int | None:
-        """The number that `append` returned for this id, if it was used."""
+    def known(self, id: str) -> Answer | None:
+        """Return what was answered to the command with this id; None if there was none."""
 
     def close(self) -> None:
-        """Nothing more will be written."""
+        """Let go of the journal; may be called twice."""
 
 
 class Listener(Protocol):
@@ -221,8 +224,8 @@ class Owner(threading.Thread):
         BadInput
             If one of them is not possible; then nothing has changed.
         """
-        if id is not None and (known := self._journal.find(id)) is not None:
-            return known, True
+        if id is not None and (known := self._journal.known(id)) is not None:
+            return known.events.stop - 1, True
         if self._runtime.state.finished:
             raise BadInput("the mission is over", remedy="start another")
         self._id = id
@@ -232,9 +235,10 @@ class Owner(threading.Thread):
             self._id = None
         return self._last, False
 
-    def find(self, id: str) -> int | None:
+    def known(self, id: str) -> int | None:
         """The number of the event that ends what was carried out under this id, if it was."""
-        return self._journal.find(id)
+        known = self._journal.known(id)
+        return None if known is None else known.events.stop - 1
 
     def set_clock(self, speed: float | None, paused: bool | None, step: bool) -> None:
         """Change how the mission clock goes; a step holds it at the next event."""
@@ -262,7 +266,7 @@ class Owner(threading.Thread):
         """Run the mission until it is told to stop."""
         try:
             self._journal = self._open_journal()
-            known = list(self._journal.replay())
+            known = self._journal.replay()
             self._last = len(known) - 1
             self._runtime = self._begin(known, self._happen)
         except BaseException as error:
@@ -333,16 +337,15 @@ class Owner(threading.Thread):
         self._asked, answer = request, request.answer
         try:
             value = request.work()
-        except BadInput as error:
-            if self._broken or answer.done():
-                answer.done() or answer.set_exception(Gone("the mission stopped"))
+        except BaseException as error:
+            refused = isinstance(error, BadInput) and not (self._broken or answer.done())
+            if not answer.done():
+                answer.set_exception(error if refused else Gone("the mission has stopped"))
+            if not refused:
                 raise
-            answer.set_exception(error)
-        except BaseException:
-            answer.done() or answer.set_exception(Gone("the mission stopped"))
-            raise
         else:
-            answer.done() or answer.set_result(value)
+            if not answer.done():
+                answer.set_result(value)
         finally:
             self._asked = None
 
@@ -352,7 +355,7 @@ class Owner(threading.Thread):
             return
         asked = any(isinstance(event, Commanded) for event in events)
         self._broken = True
-        last = self._journal.append(events, id=self._id if asked else None)
+        last = self._journal.append(events, id=self._id if asked else None).stop - 1
         self._broken = False
         self._lost |= {event.robot: event.t for event in events if isinstance(event, RobotFailed)}
         self._listener.happened(events, time.monotonic())

@@ -12,7 +12,7 @@ import uvicorn
 
 from oath.allocate import Allocator, Budget
 from oath.errors import BadInput
-from oath.events import AnyEvent, MissionStarted, Moved, ObstacleFound, StopServed
+from oath.events import AnyEvent, Moved, ObstacleFound, StopServed
 from oath.fleet.sim import SimFleet
 from oath.instruct import Interpreter
 from oath.model import Point

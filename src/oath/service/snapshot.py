@@ -51,9 +51,7 @@ def _xy(at: Sequence[float]) -> list[float]:
 def state_of(scene: Scene, moment: Moment, tally: Tally) -> dict[str, Any]:
     """Return a moment as plain data."""
     state = moment.state
-    routed = {
-        stop.task: id for id, robot in state.robots.items() for stop in reversed(robot.route)
-    }
+    routed = {stop.task: id for id, robot in state.robots.items() for stop in reversed(robot.route)}
     carriers = {task: id for id, robot in state.robots.items() for task in robot.carrying}
     held = {stop.task: id for id in state.paused for stop in state.robots[id].route}
     return {

@@ -55,7 +55,7 @@ class Talks:
         self._open()
         self._id = f"proposal:{proposal}"
         try:
-            if (known := self._owner.find(self._id)) is not None:
+            if (known := self._owner.known(self._id)) is not None:
                 raise BadInput(f"it was confirmed already, as event {known}", remedy="say it again")
             self._of(window).confirm(proposal)
         finally:
