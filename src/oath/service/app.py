@@ -207,7 +207,7 @@ def _reading(feed: Feed, owner: Owner, metrics: Metrics) -> APIRouter:
 
     @router.get(
         "/api/metrics",
-        response_class=PlainTextResponse,
+        response_class=Response,
         responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
     )
     async def numbers() -> Response:
@@ -245,13 +245,15 @@ def _asking(owner: Owner, talks: Talks, metrics: Metrics) -> APIRouter:
     @router.post("/api/instructions", **_with(_shape(shapes.Replied), CONFLICT))
     async def instruct(said: shapes.Instruction, window: Window = "") -> Response:
         """Say something in words; nothing happens before the proposal is confirmed, but a pause."""
-        return _raw(to_json({"reply": await owner.ask(lambda: talks.say(window, said.text))}))
+        reply = await _possible(owner.ask(lambda: talks.say(window, said.text)))
+        return _raw(to_json({"reply": reply}))
 
     @router.post("/api/proposals", **_with(_shape(shapes.Replied), CONFLICT))
     async def propose(asked: shapes.Commands, window: Window = "") -> Response:
         """Have commands read back, as if they had been said in words."""
         commands = [parse(command) for command in asked.commands]
-        return _raw(to_json({"reply": await owner.ask(lambda: talks.propose(window, commands))}))
+        reply = await _possible(owner.ask(lambda: talks.propose(window, commands)))
+        return _raw(to_json({"reply": reply}))
 
     @router.post("/api/proposals/{id}/confirm", **_with(_shape(shapes.Done), CONFLICT))
     async def confirm(id: str, nothing: shapes.Nothing, window: Window = "") -> Response:
