@@ -1,4 +1,4 @@
-"""What can go wrong, in three kinds."""
+"""What can go wrong, in few kinds."""
 
 from __future__ import annotations
 
@@ -38,6 +38,10 @@ class BadInput(OathError):
 
 class ProviderError(OathError):
     """An implementation behind a seam (an allocator, a fleet, ...) broke its contract."""
+
+
+class StoreError(OathError):
+    """Something could not be stored, e.g. because the disk is full; then it has not happened."""
 
 
 def did_you_mean(name: str, known: list[str]) -> str:

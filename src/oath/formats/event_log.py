@@ -126,6 +126,24 @@ def read(
     return list(_events(lines, str(path), places or {}))
 
 
+def rebuilt(line: Mapping[str, Any]) -> AnyEvent:
+    """Return the event of a line that `to_line` wrote and `json.loads` read.
+
+    Nothing is checked: several times faster than `read`, for lines that something else vouches
+    for.
+
+    Examples
+    --------
+    >>> rebuilt({"seq": 3, "t": 1.5, "type": "robot_paused", "robot": "r1"})
+    RobotPaused(t=1.5, robot='r1')
+    """
+    values: dict[str, Any] = {}
+    for name, key, make in _MAKERS[line["type"]]:
+        if key in line:
+            values[name] = line[key] if make is None else make(line[key])
+    return TYPES[line["type"]](**values)
+
+
 def _events(
     lines: list[bytes], path: str, places: Mapping[str, Point]
 ) -> Iterator[tuple[int, AnyEvent]]:
@@ -344,3 +362,21 @@ def _decoder(kind: Any) -> Decoder:
     if get_origin(kind) is Literal:
         return lambda line, field, value: line.choice(kind, field, value)
     return _DECODERS[kind]
+
+
+def _maker(kind: Any) -> Callable[[Any], Any] | None:
+    """What turns a value of JSON into one of this kind; None if they are the same."""
+    if kind == Point:
+        return tuple
+    if kind == Polygon:
+        return lambda value: tuple(map(tuple, value))
+    if kind in (Task, Mapping[str, Route]):
+        return lambda value: _DECODERS[kind](_Line("", {}), "", value)
+    return None
+
+
+_MAKERS = {
+    type: [(name, name.removesuffix("_"), _maker(kind)) for name, kind in kinds.items()]
+    for type, kinds in _KINDS.items()
+}
+"""For every event type its fields: name, key in the line, what makes the value."""

@@ -51,6 +51,12 @@ def read(path: str | Path) -> OccupancyGrid:
     return _checked(format.read(path), path)
 
 
+def files(path: Path) -> list[Path]:
+    """Return the files that a map file consists of: itself, and what it names."""
+    is_ros = FORMATS.get(path.suffix.lower()) is ros_map
+    return [path, ros_map.picture(path)] if is_ros else [path]
+
+
 def _checked(grid: OccupancyGrid, path: Path) -> OccupancyGrid:
     cells = grid.occupied
     if not isinstance(cells, np.ndarray) or cells.dtype != np.bool_ or cells.ndim != 2:

@@ -78,6 +78,20 @@ def load(path: str | Path) -> Mission:
     return mission
 
 
+def files(path: str | Path) -> list[Path]:
+    """Return the files that a mission consists of: its own first, then those of its map.
+
+    Raises
+    ------
+    BadInput
+        If one of them that names others is missing or broken.
+    """
+    path = Path(path)
+    map = read_document(path, what="mission").value.get("map")
+    named = map.get("file") if isinstance(map, dict) else None
+    return [path, *(maps.files(path.parent / named) if isinstance(named, str) else [])]
+
+
 def _check_schema(document: Document) -> None:
     """Look at the version before anything else: another version has other fields."""
     schema = document.value.get("schema", SCHEMA)

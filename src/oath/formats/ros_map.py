@@ -89,6 +89,12 @@ def read(path: Path) -> OccupancyGrid:
     )
 
 
+def picture(path: Path) -> Path:
+    """Return the path of the picture that a map_server YAML file names."""
+    named = read_document(path, what="map_server map").value.get("image")
+    return path.parent / str(named)
+
+
 def _without_foreign_keys(document: Document) -> Document:
     """Drop keys of other tools (map_server ignores them), but not those that look misspelt."""
     known = list(RosMap.model_fields)
