@@ -189,6 +189,19 @@ def finds_what_is_near(make: Make) -> None:
     assert 2.5 <= found[0].t <= 2.5 + 0.06
 
 
+def tells_how_far_it_came_before_a_find(make: Make) -> None:
+    """Else a log that ends there would have it find what it cannot see."""
+    crate = gate("crate", box(5, 0.5, 6, 1.5))
+    fleet = make(yard([robot("r", (1, 1), sensing=1.5)], [visit("a", (4, 1))], obstacles=(crate,)))
+    fleet.send("r", order((4.5, 1)))
+    before, find, after, served = drain(fleet)
+    assert isinstance(before, Moved) and isinstance(after, Moved)
+    assert isinstance(find, ObstacleFound) and isinstance(served, StopServed)
+    assert (before.start, before.end, before.from_) == (0.0, find.t, (1, 1))
+    assert (after.start, after.end, after.from_) == (find.t, 3.5, before.to)
+    assert after.to == (4.5, 1)
+
+
 CONTRACT = [
     drives_its_path_and_serves,
     keeps_the_speed,
@@ -203,6 +216,7 @@ CONTRACT = [
     takes_a_new_path_after_its_current_move,
     cancel_of_an_idle_robot_changes_nothing,
     finds_what_is_near,
+    tells_how_far_it_came_before_a_find,
 ]
 
 

@@ -574,6 +574,22 @@ def test_pulling_in_the_open_gives_the_straight_line() -> None:
     assert planner._plan.length == pytest.approx(np.hypot(6.9, 5.9))
 
 
+def test_a_robot_knows_its_way_ahead_between_waypoints() -> None:
+    roadmap = small_roadmap(Map(bounds=BOX), points=100)
+    planner = Planner(roadmap, rules_of(()), 0, (0.5, 0.5))
+    planner.begin((0.5, 0.5), route((7.5, 6.5)))
+    way = [(0.5, 0.5), *planner.leg()]
+    for k, (a, b) in enumerate(pairwise(way)):
+        left = along(way[k:])
+        for share in (0.0, 0.1, 0.5, 0.9):
+            planner.moved((a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])))
+            assert planner.rest() == pytest.approx(b)
+            assert planner.to_go() == pytest.approx(left - share * along([a, b]))
+    planner.moved(way[-1])
+    assert planner.rest() == way[-1]
+    assert planner.to_go() == 0.0
+
+
 # --- Which obstacles matter
 
 

@@ -210,14 +210,20 @@ class SimFleet:
     def _end_move(self, body: _Body) -> None:
         """Come to rest now, at the end of the current move or on the way."""
         assert body.move is not None
-        a, _, start, _ = body.move
-        b = self._pose(body).at
-        body.at, body.move = b, None
+        self._tell_move(body)
+        body.at, body.move = body.move[0], None
         body.ticket += 1
-        if self._now > start:
-            self._due.append(
-                Moved(t=self._now, robot=body.robot.id, from_=a, to=b, start=start, end=self._now)
-            )
+
+    def _tell_move(self, body: _Body) -> None:
+        """Report how far the robot came on its current move, if it is on one; the rest is left."""
+        if body.move is None or self._now <= body.move[2]:
+            return
+        a, b, start, end = body.move
+        here = self._pose(body).at
+        body.move = (here, b, self._now, end)
+        self._due.append(
+            Moved(t=self._now, robot=body.robot.id, from_=a, to=here, start=start, end=self._now)
+        )
 
     def _serve(self, body: _Body) -> None:
         order = body.order
@@ -232,6 +238,7 @@ class SimFleet:
     def _find(self, body: _Body, id: str) -> None:
         sight = self._unknown.pop(id, None)
         if sight is not None:
+            self._tell_move(body)  # where it was found from is told before what was found
             self._due.append(
                 ObstacleFound(
                     t=self._now,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from shapely import LineString
 from shapely import Polygon as ShapelyPolygon
@@ -17,6 +18,9 @@ from oath.motion.mission_automaton import Letter, RouteAutomaton, Rules
 from oath.world.roadmap import Roadmap
 
 Array = NDArray[np.float64]
+
+_SAME = 1e-9
+"""Points this near to each other are one [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,18 +139,15 @@ class Planner:
 
         The way on is that from there to the current leg's stop.
         """
-        leg = self._plan.legs[0] if self._plan.legs else np.array([self.position])
+        way = self._ahead()
         if self._joins is not None:
-            return self._joins, _length(leg)
-        here = int(np.argmin(np.hypot(*(leg - np.array([self.position])).T)))
-        on = leg[here + 1 :] if here + 1 < len(leg) else leg[here:]
+            return self._joins, _length(self._plan.legs[0] if self._plan.legs else way)
+        on = way[1:] if len(way) > 1 else way
         return (float(on[0, 0]), float(on[0, 1])), _length(on)
 
     def way(self) -> list[Point]:
         """What is left of the current leg's waypoints [m], from where the robot was last seen."""
-        leg = self._plan.legs[0] if self._plan.legs else np.array([self.position])
-        here = int(np.argmin(np.hypot(*(leg - np.array([self.position])).T)))
-        return [(float(x), float(y)) for x, y in leg[here:]]
+        return [(float(x), float(y)) for x, y in self._ahead()]
 
     def at_stop(self) -> str | None:
         """The atom of the current leg's stop, if the robot has come to it."""
@@ -154,6 +155,20 @@ class Planner:
             return None
         stop = self._services[self._leg]
         return stop.own if stop.at == self.position else None
+
+    def _ahead(self) -> Array:
+        """What is left of the current leg, from where the robot was last seen."""
+        here = np.array([self.position])
+        if not self._plan.legs:
+            return here
+        way = self._plan.legs[0]
+        sides = shapely.linestrings(np.stack([way[:-1], way[1:]], axis=1))
+        away = shapely.distance(sides, shapely.points(here))
+        on = int(np.argmax(away <= away.min(initial=np.inf) + _SAME)) if len(away) else -1
+        ahead = way[on + 1 :]
+        if len(ahead) > 1 and np.hypot(*(ahead[0] - here[0])) <= _SAME:
+            ahead = ahead[1:]  # it stands on the waypoint
+        return np.concatenate([here, ahead])
 
     def moved(self, to: Point) -> None:
         """The robot drove straight from where it was to a point [m]."""
