@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -82,3 +85,46 @@ def budget_option(command: Callable[..., None]) -> Callable[..., None]:
         help="Time to improve an answer: 200ms, 1.5s.  [default: a fixed number of iterations, the "
         "same on every machine]",
     )(command)
+
+
+def interpreter_options(command: Callable[..., None]) -> Callable[..., None]:
+    """``--llm``, ``--llm-url``, ``--llm-timeout`` and ``--llm-host``: the command's `interpreter`.
+
+    There is no option for a key: what stands on a command line can be read by others.
+    """
+
+    @click.option(
+        "--llm",
+        metavar="PROVIDER:NAME",
+        help="Language model that interprets first, e.g. ollama:qwen3:8b; none for none.  "
+        "[default: $OATH_LLM_MODEL, else none]",
+    )
+    @click.option("--llm-url", metavar="URL", help="Its address.  [default: the provider's own]")
+    @click.option(
+        "--llm-timeout",
+        callback=seconds,
+        help="How long it may take: 500ms, 8s.  [default: $OATH_LLM_TIMEOUT, else 8s]",
+    )
+    @click.option(
+        "--llm-host",
+        multiple=True,
+        metavar="HOST",
+        help="Host that may be sent words and the key, beside the usual ones; may be repeated.",
+    )
+    @wraps(command)
+    def with_interpreter(
+        *args: Any,
+        llm: str | None,
+        llm_url: str | None,
+        llm_timeout: float | None,
+        llm_host: tuple[str, ...],
+        **kwargs: Any,
+    ) -> None:
+        from oath.instruct import chosen_interpreter
+
+        interpreter = chosen_interpreter(
+            os.environ, model=llm, url=llm_url, timeout=llm_timeout, hosts=llm_host
+        )
+        command(*args, interpreter=interpreter, **kwargs)
+
+    return with_interpreter
