@@ -113,7 +113,7 @@ class ModelInterpreter:
         return read(_content(response))
 
 
-def _content(response: ModelResponse) -> str | dict[str, Any]:
+def _content(response: ModelResponse) -> str:
     """The answer's text, or what the one tool was called with."""
     from pydantic_ai.messages import TextPart, ToolCallPart
 
@@ -121,7 +121,7 @@ def _content(response: ModelResponse) -> str | dict[str, Any]:
         raise Unusable
     calls = [part for part in response.parts if isinstance(part, ToolCallPart)]
     if len(calls) == 1:
-        return calls[0].args if isinstance(calls[0].args, str) else calls[0].args_as_dict()
+        return calls[0].args_as_json_str()
     if calls:
         raise Unusable
     return "".join(part.content for part in response.parts if isinstance(part, TextPart))

@@ -77,7 +77,7 @@ class Answer:
     commands: tuple[tuple[str, dict[str, Any]], ...]
 
 
-def read(text: str | Mapping[str, Any]) -> Answer:
+def read(text: str) -> Answer:
     """Read an answer.
 
     Raises
@@ -85,12 +85,12 @@ def read(text: str | Mapping[str, Any]) -> Answer:
     Unusable
         If it is not of the form that was asked for.
     """
-    if isinstance(text, str):
-        try:
-            text = json.loads(text, parse_constant=_no_number)
-        except (ValueError, RecursionError):
-            raise Unusable from None
-    match text:
+    try:
+        # Python's integers have no bound that the rest of the code would expect.
+        plain = json.loads(text, parse_int=float, parse_constant=_no_number)
+    except (ValueError, RecursionError):
+        raise Unusable from None
+    match plain:
         case {"verdict": str(verdict), "about": "new" | "draft" as about, "commands": list(found)}:
             pass
         case _:
@@ -252,7 +252,7 @@ def _refuse(intent: str, kept: dict[str, Any], error: BadInput, live: Live) -> R
     field = (error.field or "").split(".")[0]
     missing = (field,) if field in COMMANDS[intent].model_fields else ()
     return Reply(
-        status="clarification",
+        status="need_more_info" if missing and field not in kept else "clarification",
         intent=intent,
         parameters={name: value for name, value in kept.items() if name not in missing},
         missing=missing,
