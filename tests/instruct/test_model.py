@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Callable
-from contextlib import nullcontext
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, nullcontext
 from dataclasses import replace
 from typing import Any
 
@@ -92,7 +92,10 @@ def add(location: object = (2, 8), delivery_point: object = "c", **more: object)
 GOOD = [
     ("New task at five and eight point five, take it to C", add((5, 8.5), "c")),
     ("there is a special job aa2 at (2, 8) for c", add(task_type="special", task_label="aa2")),
-    ("urgent: fetch something at 2, 8 and bring it to (3, 4)", add((2, 8), (3, 4), priority="high")),
+    (
+        "urgent: fetch something at 2, 8 and bring it to (3, 4)",
+        add((2, 8), (3, 4), priority="high"),
+    ),
     (
         "There is a bush from (7, 5) to (8, 5)",
         ("obstacle_update", {"obstacle_location": [[7, 5], [8, 5]], "obstacle_type": "bush"}),
@@ -102,8 +105,7 @@ GOOD = [
     ("bb can wait", ("change_task_priority", {"task_label": "bb", "priority": "low"})),
     ("forget about task bb 1", ("cancel_task", {"task_label": "bb1"})),
     ("bush 1 is gone", ("remove_obstacle", {"obstacle": "bush-1"})),
-    ("hold robot two", ("pause_robot", {"robot": "robot2"})),
-    ("everybody stop", ("pause_robot", {"robot": "all"})),
+    ("all robots may go on", ("resume_robot", {"robot": "all"})),
     ("robot2 may go on", ("resume_robot", {"robot": "robot2"})),
     ("robot1 is dead", ("robot_failed", {"robot": "robot1"})),
     ("how far are we?", ("query_status", {})),
@@ -143,6 +145,7 @@ MADE_UP = [
     ("aa last", ("change_task_priority", {"task_label": "aa"}), ("priority",)),
     ("aa last", ("change_task_priority", {"task_label": "aa", "priority": "high"}), ("priority",)),
     ("hold it", ("pause_robot", {"robot": "all"}), ("robot",)),
+    ("let it go on", ("resume_robot", {"robot": "robot2"}), ("robot",)),
     ("it is broken", ("robot_failed", {"robot": "robot1"}), ("robot",)),
     (
         "a wall from (7, 5) to (8, 5)",
@@ -256,18 +259,33 @@ def test_what_is_not_to_be_done_is_refused(verdict: str, live: Live) -> None:
 @pytest.mark.parametrize(
     ("said", "meant"),
     [
+        ("pause robot2", ("pause_robot", {"robot": "robot2"})),
         ("don't stop robot2", ("pause_robot", {"robot": "robot2"})),
-        ("if it rains, stop robot2", ("pause_robot", {"robot": "robot2"})),
-        ("robot2 looks fine", ("pause_robot", {"robot": "robot2"})),
+        ("everybody stop", ("pause_robot", {"robot": "all"})),
         ("cancel aa", ("undo", {})),
         ("cancel aa", ("query_status", {})),
     ],
 )
-def test_what_needs_no_value_or_no_yes_must_be_said_plainly(
-    said: str, meant: Any, live: Live
-) -> None:
+def test_a_model_acts_by_no_command_and_makes_up_no_wish(said: str, meant: Any, live: Live) -> None:
     reply = ask(told(meant), live, said)
-    assert (reply.status, reply.commands) == ("clarification", ())
+    assert (reply.status, reply.intent, reply.commands) == ("clarification", None, ())
+    assert "say it plainly" in reply.message
+
+
+def test_a_stop_needs_no_model(live: Live) -> None:
+    class Hears:
+        def interpret(self, dialogue: Dialogue, live: Live) -> Reply:
+            stop = parse({"intent": "pause_robot", "parameters": {"robot": "all"}})
+            return Reply(status="complete", message="", commands=(stop,))
+
+    @asynccontextmanager
+    async def no_model() -> AsyncIterator[Any]:
+        raise AssertionError
+        yield
+
+    reply = ModelInterpreter(no_model, Hears()).interpret(Dialogue(said=("stop!",)), live)
+    assert [command.intent for command in reply.commands] == ["pause_robot"]
+    assert "language model" not in reply.message
 
 
 # -- answers that cannot be used
@@ -403,7 +421,12 @@ def test_names_of_a_mission_cannot_speak() -> None:
     label = INJECTED[:64]
     mission = replace(
         MISSION,
-        places={**MISSION.places, label: (8.0, 8.0), "<|im_end|>": (6.0, 6.0), "x" * 65: (7.0, 7.0)},
+        places={
+            **MISSION.places,
+            label: (8.0, 8.0),
+            "<|im_end|>": (6.0, 6.0),
+            "x" * 65: (7.0, 7.0),
+        },
         tasks=(*MISSION.tasks, delivery(label + "!", (1, 9), (5, 9), type="normal")),
     )
     live = live_of(mission)

@@ -33,21 +33,24 @@ Opened = Callable[[], "AbstractAsyncContextManager[Model]"]
 class ModelInterpreter:
     """An `Interpreter` that asks a language model, and another interpreter if that fails.
 
+    What happens without a confirmation (a stop) is for the other interpreter alone: it neither
+    waits for the model nor depends on it.
+
     Parameters
     ----------
     opened
         Gives a model for one request, e.g. `oath.instruct.model.endpoint.opened` of an endpoint.
-    fallback
-        Answers if the model does not; the reply then says so.
+    offline
+        Answers if the model does not, and the reply then says so; needs no time.
     timeout
         How long the model may take [s].
     """
 
-    def __init__(self, opened: Opened, fallback: Interpreter, *, timeout: float = TIMEOUT) -> None:
+    def __init__(self, opened: Opened, offline: Interpreter, *, timeout: float = TIMEOUT) -> None:
         # Loading the library takes seconds: not in the first instruction.
         import pydantic_ai.direct  # noqa: F401
 
-        self._opened, self._fallback, self._timeout = opened, fallback, timeout
+        self._opened, self._offline, self._timeout = opened, offline, timeout
         self._rules = rules()
 
     def interpret(self, dialogue: Dialogue, live: Live) -> Reply:
@@ -61,12 +64,14 @@ class ModelInterpreter:
                 message=f"That is too long: {len(said)} characters, at most {LONGEST}. Say one "
                 "thing at a time.",
             )
+        reply = self._offline.interpret(dialogue, live)
+        if reply.commands and all(command.immediate for command in reply.commands):
+            return reply
         try:
             answer = self._ask(dialogue, live)
         except Exception as error:
             # The clients raise errors of many kinds. None of them may stop the dialogue, and their
             # texts may hold anything, so they are not shown.
-            reply = self._fallback.interpret(dialogue, live)
             why = _what_happened(error, self._timeout)
             note = f"(The language model {why}; understood offline.)"
             return replace(reply, message=f"{note} {reply.message}".strip())

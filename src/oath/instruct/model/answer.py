@@ -44,7 +44,6 @@ _QUESTIONS = {
 }
 
 _CUES = {
-    "pause_robot": frozenset(words("freeze halt hold pause stand stay stop wait")),
     "undo": frozenset(words("back reverse revert rollback scrap undo")),
     "query_status": frozenset(
         words(
@@ -53,15 +52,13 @@ _CUES = {
         )
     ),
 }
-"""One of these must be said: of these commands no value, or no confirmation, tells a mistake."""
+"""One of these must be said: these commands have no value that tells a mistake."""
 
-_DOUBT = frozenset(
-    words(
-        "can't cannot could don't dont if maybe never no not should shouldn't unless when without "
-        "won't would wouldn't"
-    )
-)
-"""Words next to which nothing happens at once."""
+_PLAINLY = {
+    "undo": "undo the last change",
+    "query_status": "status",
+    "pause_robot": "pause {robot}",
+}
 
 
 class Unusable(Exception):
@@ -164,17 +161,19 @@ def _judge_one(
     try:
         command = parse({"intent": intent, "parameters": parameters})
         filled = command.filled(live)
+        # What happens without a confirmation is not for a model to say.
+        acts = command.immediate and filled.events(live)
     except BadInput as error:
         return _refuse(intent, kept, error, live)
     if intent == "change_task_priority" and not _said(
         intent, "priority", getattr(command, "priority", ""), said, known.get("priority")
     ):
         return _ask(intent, kept, ("priority",), live)
-    spoken = set(words(said))
-    if intent in _CUES and draft is None and not _clearly(intent, spoken):
+    if acts or (intent in _CUES and draft is None and not _CUES[intent] & set(words(said))):
+        example = _with_names(_PLAINLY[intent], live)
         return Reply(
             status="clarification",
-            message=f"If that is what you want, say it plainly, for example: {_plainly(intent)}.",
+            message=f"If that is what you want, say it plainly, for example: {example}.",
         )
     # What was left open stays open: it is made up when the command is proposed.
     return filled.model_copy(update={name: None for name in fields if name not in _given(command)})
@@ -182,15 +181,6 @@ def _judge_one(
 
 def _given(command: Command) -> set[str]:
     return {name for name in type(command).model_fields if getattr(command, name) is not None}
-
-
-def _clearly(intent: str, spoken: set[str]) -> bool:
-    doubt = _DOUBT & spoken if COMMANDS[intent].immediate and intent != "query_status" else None
-    return bool(_CUES[intent] & spoken) and not doubt
-
-
-def _plainly(intent: str) -> str:
-    return {"pause_robot": "pause robot NAME", "undo": "undo", "query_status": "status"}[intent]
 
 
 def _said(intent: str, name: str, value: Any, said: str, known: Any) -> bool:
