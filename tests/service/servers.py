@@ -61,7 +61,9 @@ class Server:
 
 
 @contextmanager
-def serving(mission: str | Path = MAZE, *options: str, token: str | None = OPERATOR) -> Iterator[Server]:
+def serving(
+    mission: str | Path = MAZE, *options: str, token: str | None = OPERATOR
+) -> Iterator[Server]:
     """Start a server; end it in any case."""
     command = [sys.executable, "-W", "error", "-m", "oath.cli", "serve", str(mission)]
     command += ["--port", "0", *options]
