@@ -583,11 +583,11 @@ def test_a_robot_knows_its_way_ahead_between_waypoints() -> None:
         left = along(way[k:])
         for share in (0.0, 0.1, 0.5, 0.9):
             planner.moved((a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])))
-            assert planner.rest() == pytest.approx(b)
-            assert planner.to_go() == pytest.approx(left - share * along([a, b]))
+            rest, on = planner.ahead()
+            assert rest == pytest.approx(b)
+            assert on == pytest.approx(left - along([a, b]))
     planner.moved(way[-1])
-    assert planner.rest() == way[-1]
-    assert planner.to_go() == 0.0
+    assert planner.ahead() == (way[-1], 0.0)
 
 
 # --- Which obstacles matter

@@ -151,7 +151,8 @@ class Planner:
 
     def at_stop(self) -> str | None:
         """The atom of the current leg's stop, if the robot has come to it."""
-        if self._joins is not None or not self._plan.legs:
+        # A leg may lead from its stop round and back, for a rule's sake.
+        if self._joins is not None or not self._plan.legs or _length(self._ahead()) > 0.0:
             return None
         stop = self._services[self._leg]
         return stop.own if stop.at == self.position else None
