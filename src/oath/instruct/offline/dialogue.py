@@ -1,0 +1,264 @@
+"""Follow-up turns: what was asked for is filled in, corrected or dropped."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from oath.commands import COMMANDS
+from oath.errors import did_you_mean
+from oath.instruct import Draft, Reply
+from oath.instruct.offline import gates, slots
+from oath.instruct.offline.gates import as_line
+from oath.instruct.offline.slots import Filled, Heard
+from oath.instruct.offline.tokens import Token
+from oath.instruct.offline.understand import NEEDS, answer, meaning, understand
+
+_DROP = re.compile(
+    r"^(?:\W*(?:no|oh|ok|okay|well|ah|sorry|actually|please|just) )*\W*(?:never ?mind|forget (?:it|that|about it"
+    r"|about that)|drop (?:it|that)|scrap (?:it|that)|leave it|skip it|cancel (?:it|that|this)|abort|stop asking|"
+    r"no thanks?|no thank you|nothing|not needed|let it be|do not bother|i changed my mind|discard (?:it|that)"
+    r"|no|nope|cancel|dismiss|ignore (?:it|that))(?: (?:please|then|anymore|again|now|after all|thanks))*\W*$"
+)
+
+_CORRECTS = re.compile(
+    r"\b(no|not|i mean|i meant|meant|rather|instead|sorry|actually|wrong|correct\w*|change|should be|make (?:it|that)"
+    r"|wait|oops|better|set it|it is|it should)\b"
+)
+
+
+def follow_up(heard: Heard, draft: Draft) -> Reply:
+    """Interpret words in the light of an open question or proposal."""
+    if why := gates.refused(heard.line):
+        return Reply(status="clarification", message=why)
+    if _DROP.match(heard.line.strip()):
+        return Reply(status="clarification", message="Dropped; nothing is changed.")
+    if _anew(heard, draft):
+        return understand(heard)
+    filled = Filled(parameters=dict(draft.parameters))
+    if not _fill(heard, draft, filled):
+        reply = understand(heard)
+        if reply.intent is None or (reply.intent == draft.intent and not reply.parameters):
+            return _again(heard, draft)
+        return reply
+    why = gates.not_meant(heard.line, draft.intent)
+    if why is not None and not filled.trouble and "not to do" not in why:
+        filled.object_to(f"{why} Say it plainly if that is meant.")
+    return answer(heard, draft.intent, filled)
+
+
+def _again(heard: Heard, draft: Draft) -> Reply:
+    """Ask once more."""
+    if not draft.missing:
+        return Reply(
+            status="clarification",
+            intent=draft.intent,
+            parameters=draft.parameters,
+            message="I do not understand what is to be different. Say the new value, e.g. 'no, to "
+            "(5, 16)', or 'never mind'.",
+        )
+    return Reply(
+        status="need_more_info",
+        intent=draft.intent,
+        parameters=draft.parameters,
+        missing=draft.missing,
+        message="I do not understand that. " + slots.ask(heard, draft.missing),
+    )
+
+
+def _anew(heard: Heard, draft: Draft) -> bool:
+    """Whether words are an instruction of their own and no answer."""
+    words = [one for one in heard.tokens if one.kind == "word"]
+    if len(words) < 2 and not (words and words[0].text in _ALONE):
+        return False
+    meant = meaning(heard)
+    if meant.share < 0.7:
+        return False
+    kinds = {one.kind.removeprefix("unknown_") for one in heard.tokens}
+    names = meant.intent not in NEEDS or bool(NEEDS[meant.intent] & kinds)
+    if meant.intent != draft.intent:
+        about = meant.intent == "change_task_priority" and draft.intent == "add_task"
+        return names and not (about and not heard.of("label"))
+    if _CORRECTS.search(heard.line):
+        return False
+    if draft.intent == "add_task":
+        return sum(one.kind in ("point", "place") for one in heard.tokens) >= 2 and len(words) > 3
+    return names and len(words) > 3
+
+
+_ALONE = {"undo", "status", "stop", "halt", "freeze"}
+
+
+def _fill(heard: Heard, draft: Draft, filled: Filled) -> bool:
+    """Fill or correct parameters of the draft; False if the words give none."""
+    heard = replace(heard, tokens=tuple(_not_denied(heard.tokens, draft)))
+    before = dict(filled.parameters)
+    match draft.intent:
+        case "add_task":
+            _fill_task(heard, draft, filled)
+        case "obstacle_update":
+            _fill_obstacle(heard, filled)
+        case "change_task_priority" | "cancel_task":
+            _fill_label(heard, draft, filled)
+        case "remove_obstacle":
+            _fill_name(heard, filled, "obstacle", list(heard.live.state.obstacles))
+        case "pause_robot" | "resume_robot" | "robot_failed":
+            _fill_name(heard, filled, "robot", list(heard.live.state.robots))
+    found = filled.parameters != before or bool(filled.trouble)
+    found = found or any(one.kind not in ("word", "mark", "number") for one in heard.tokens)
+    fields = COMMANDS[draft.intent].model_fields
+    for name in (*draft.missing, *(name for name, one in fields.items() if one.is_required())):
+        short = name == "obstacle_location" and len(filled.parameters.get(name, ())) < 2
+        if (name not in filled.parameters or short) and name not in filled.missing:
+            filled.missing.append(name)
+    return found
+
+
+def _not_denied(tokens: Sequence[Token], draft: Draft) -> list[Token]:
+    """Leave out what a correction takes back, as B in ``not B but C`` or ``C instead of B``."""
+    kept: list[Token] = []
+    for n, token in enumerate(tokens):
+        before = [one.text for one in tokens[max(n - 3, 0) : n] if one.text not in _NOUNS][-2:]
+        named = token.kind not in ("word", "mark")
+        if named and ("not" in before or before in (["instead", "of"], ["rather", "than"])):
+            continue
+        kept.append(token)
+    old = [str(list(v) if isinstance(v, (list, tuple)) else v) for v in draft.parameters.values()]
+    spots = [one for one in kept if one.kind in _SPOTS]
+    if len(spots) == 2:
+        again = [one for one in spots if str(_plain(one)) in old]
+        if len(again) == 1 and _CHANGES.search(as_line(kept)):
+            kept.remove(again[0])
+    return kept
+
+
+_NOUNS = {"point", "room", "station", "task", "to", "at", "the", "place", "robot", "in"}
+_SPOTS = ("point", "place", "unknown_place")
+_CHANGES = re.compile(r"\b(change|replace|swap|instead|rather|switch|correct\w*|make)\b")
+
+
+def _plain(token: Token) -> Any:
+    return list(token.value) if token.kind == "point" else token.value
+
+
+_TO = re.compile(
+    r"\b(to|deliver\w*|destination|drop\w*|goes|bring|take|target|for|ends?|unload|towards|into)\b"
+)
+_FROM = re.compile(r"\b(from|pick\w*|collect|fetch|starts?|source|origin|location|located|get it|waits?)\b")
+
+
+def _fill_task(heard: Heard, draft: Draft, filled: Filled) -> None:
+    extra = Filled()
+    slots.read_new_label(heard, extra)
+    slots.read_type(heard, extra)
+    filled.trouble = extra.trouble
+    said = slots.said_priority(heard.line)
+    if len(said) == 1:
+        extra.parameters["priority"] = said.pop()
+    filled.parameters |= extra.parameters
+    words = [one for one in heard.tokens if one.kind not in ("mark",)]
+    bare = len(words) == 1 and words[0].kind in ("word", "unknown_label")
+    asked = "task_label" in draft.missing or not draft.missing
+    if bare and asked and not extra.parameters and re.fullmatch(r"\w[\w.-]{0,31}", words[0].raw):
+        if "task_label" in draft.missing or words[0].text not in heard.models.words:
+            filled.parameters["task_label"] = words[0].raw
+    spots = [n for n, one in enumerate(heard.tokens) if one.kind in _SPOTS]
+    if len(spots) > 2:
+        filled.object_to("Which is where it is picked up, and which where it goes?")
+    elif len(spots) == 2:
+        roles = slots.assign_roles(heard, spots) or {spots[0]: "pickup", spots[1]: "delivery"}
+        for at, role in roles.items():
+            name = "location" if role == "pickup" else "delivery_point"
+            slots.read_spot(heard, filled, name, at)
+    elif spots:
+        name = _asked_spot(heard, draft, spots[0])
+        if name is None:
+            raw = heard.tokens[spots[0]].raw
+            filled.object_to(
+                f"Is {raw} where it is picked up or where it goes? Say 'from {raw}' or 'to {raw}'."
+            )
+        else:
+            slots.read_spot(heard, filled, name, spots[0])
+
+
+def _asked_spot(heard: Heard, draft: Draft, at: int) -> str | None:
+    """Which of a task's two ends one place or point is; None if that is not clear."""
+    before = as_line(heard.tokens[:at])
+    to, start = _TO.search(before), _FROM.search(before)
+    if to and not start:
+        return "delivery_point"
+    if start and not to:
+        return "location"
+    asked = [one for one in ("location", "delivery_point") if one in draft.missing]
+    if len(asked) == 1:
+        return asked[0]
+    point = heard.tokens[at].kind == "point"
+    if asked:
+        return "location" if point else None
+    if isinstance(draft.parameters.get("delivery_point"), str):
+        return "location" if point else "delivery_point"
+    return None
+
+
+def _fill_obstacle(heard: Heard, filled: Filled) -> None:
+    kinds = {str(one.value) for one in heard.of("kind")}
+    if len(kinds) == 1:
+        filled.parameters["obstacle_type"] = kinds.pop()
+    points = []
+    for n, token in enumerate(heard.tokens):
+        if token.kind == "point":
+            if gates.is_vague(heard.tokens, n):
+                filled.object_to(f"That must be exact. {slots.ask_extent()}", "obstacle_location")
+                return
+            points.append(token.value)
+    known = [tuple(one) for one in filled.parameters.get("obstacle_location", ())]
+    if len(points) == 1 and len(known) == 1 and points != known:
+        points = [*known, *points]
+    elif len(points) == 1 and len(known) > 1:
+        filled.object_to(f"Which point is that? {slots.ask_extent()}", "obstacle_location")
+        return
+    if points:
+        slots.add_points(heard, filled, points)
+
+
+def _fill_label(heard: Heard, draft: Draft, filled: Filled) -> None:
+    if draft.intent == "change_task_priority":
+        said = slots.said_priority(heard.line)
+        said |= {one.text for one in heard.tokens if one.text in ("low", "normal", "high")}
+        if len(said) == 1:
+            filled.parameters["priority"] = said.pop()
+        elif said:
+            filled.object_to("Which priority: low, normal or high?", "priority")
+    told = ("label", "unknown_label", "point", "place")
+    if heard.of(*told):
+        filled.parameters.pop("task_label", None)
+        slots.read_task(heard, filled)
+    elif words := _strange_name(heard):
+        filled.object_to(
+            f"There is no task '{words.raw}'. {slots.ask_label(heard)}", "task_label"
+        )
+
+
+def _strange_name(heard: Heard) -> Token | None:
+    """The one word of an answer, if it is none that is known."""
+    words = [one for one in heard.tokens if one.kind == "word"]
+    known = heard.models.words
+    return words[0] if len(words) == 1 and words[0].text not in known else None
+
+
+def _fill_name(heard: Heard, filled: Filled, name: str, known: Sequence[str]) -> None:
+    named = heard.of(name)
+    if len(named) == 1:
+        filled.parameters[name] = named[0].value
+    elif named:
+        filled.several = [str(one.value) for one in named]
+        filled.parameters.pop(name, None)
+        filled.parameters[name] = filled.several[0]
+    elif word := next(iter(heard.of(f"unknown_{name}")), None) or _strange_name(heard):
+        filled.object_to(f"There is no {name} '{word.raw}'; {did_you_mean(word.text, list(known))}", name)
+    elif "robot" == name and (numbers := heard.of("number")):
+        fits = [one for one in known if re.sub(r"\D", "", one) == numbers[0].text]
+        if len(numbers) == 1 and len(fits) == 1:
+            filled.parameters[name] = fits[0]

@@ -1,0 +1,256 @@
+"""What keeps words from being acted on: they ask, deny, doubt, report, or say more than is known.
+
+Every gate reads an instruction as one line of words and tags, e.g. ``do not cancel <label>``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Container, Sequence
+
+from oath.instruct.offline.tokens import Token
+
+
+def as_line(tokens: Sequence[Token]) -> str:
+    """An instruction as one line of words, marks and tags."""
+    return " ".join(one.text if one.kind in ("word", "mark") else f"<{one.kind}>" for one in tokens)
+
+
+_REFUSED = re.compile(
+    r"\b(ignore|disregard|forget|override|bypass) (\w+ ){0,3}(instructions?|rules?|prompts?|commands?"
+    r"|checks?|confirmations?|safety|everything|above|previous|restrictions?|guidelines?)\b"
+    r"|\b(system prompt|developer mode|jailbreak|you are now|act as|pretend|password|api key"
+    r"|without (asking|confirming|confirmation|any confirmation|a confirmation)|do not ask|no questions"
+    r"|auto ?-?confirm\w*|confirm (it|this|that|everything|automatically|yourself)|self-confirm"
+    r"|already (confirmed|approved)|approve (it|this|everything))\b"
+    r"|\b(system|assistant|developer|admin|root) :|[{}<$\\](?!(point|place|robot|label|obstacle|kind"
+    r"|type|number|speech|unknown_\w+)>)"
+)
+
+_VERB = (
+    r"(?:add|create|register|insert|enter|make|set|mark|put|raise|lower|increase|decrease|change"
+    r"|cancel|delete|remove|drop|abort|scrap|clear|erase|pause|stop|halt|hold|freeze|resume|restart"
+    r"|continue|release|undo|revert|touch|take|bring|deliver|prioriti[sz]e|move|start|let|draw|log"
+    r"|schedule|block|close|report|do|give|update|need|want|go|send|fetch|pick|collect|include|file"
+    r"|skip|kill|bump|boost|expedite|finish|handle|place|book|open|call|declare|treat|consider|plan"
+    r"|unpause|reopen|count|write|reset|switch|push|queue|note|act|carry|tell|have|get|keep)"
+)
+
+_NOT = re.compile(
+    rf"\b(do|please|never|should|must|would|need|to|can|could|may|shall|will) not (?:\w+ )?{_VERB}\b"
+    rf"|\b(never|not|rather not|refrain from|avoid|instead of|without|stop) (?:to )?{_VERB}(?:ing|ting"
+    rf"|ping|ning)?\b|\bno (?:need|reason|point|use|way)\b|\bby no means\b|\bunder no circumstances\b"
+    r"|\b(adding|creating|cancelling|pausing|stopping|removing|resuming|raising) \w+ is (not|wrong)\b"
+    r"|\bdid not\b|\b(has|have|had) not\b|\bneither\b|\b(is|are|am) not (going|planning|asking|saying)\b"
+    r"|\bnot (a|an|the|<\w+>|yet|now|today)\b|\bno (new|more)? ?(task|job|order)s?\b|\bnever\b"
+)
+_NOT_AFTER_ALL = re.compile(
+    r"\b(do not|never) (forget|hesitate|delay|wait|postpone|put off|be late|miss|lose time|leave)\b"
+    r"|\b(do|does|did|can|could|may|must|should|will|would|shall) (not|no longer) (\w+ )?(pass|drive|"
+    r"go|enter|get|move|work|respond|answer|react|start|cross|run|reach|use|wait|be|seem|look|need|"
+    r"want|exist|block|fit|traverse|turn|reply|function|operate|stand|matter|communicate|continue|"
+    r"boot|have|count|rely|think|rush|hurry|take|let|care|travel|navigate|proceed|know)\b"
+    r"|\bno need (for|to)\b|\bno (longer|more|rush|hurry|urgency)\b|\bnot (any|so|that|very|too|really"
+    r"|urgent|important|needed|in a hurry|as)\b|\bneed not\b|\bnot a priority\b|\bnot (\w+ing)\b"
+    r"|\b(is|are) not (?!going|planning|asking|saying)"
+)
+
+_ASKS = re.compile(
+    r"^(?:\W*(?:and|but|so|hey|hi|hello|ok|okay|well|um|sorry|please|now) )*(?:is|are|was|were|do"
+    r"|does|did|has|have|had|why|who|whose|when|how|what|where|which|should|shall|must|may i|might"
+    r"|am)\b(?! (?:about|fetch|collect|pick) )"
+)
+_ASKS_FOR = re.compile(
+    r"\b(can|could|would|will|may|might) (you|we|i|somebody|someone|<robot>|u|one|anybody|anyone)\b"
+    r"|\b(would|do) you mind\b|\bwhy (not|do not we|do not you)\b|\bhow about\b|\bmind (\w+ing)\b"
+    r"|\bpossible to\b|\blet us\b|\bshall we\b|\bplease\b"
+)
+_ASKS_ABOUT = re.compile(
+    r"\b(wonder|wondering|know|tell (me|us)|ask(ing)?|check|find out|see|sure|curious|doubt) (if|whether"
+    r"|why|when|who|what|how|where)\b|\bwhat if\b|\bright \?$|\b(is|are|was) (it|there|that) not \?$"
+    r"|\b(not|correct|yes|no) \?$"
+)
+
+_IF = re.compile(
+    r"\b(if|unless|until|till|once|whenever|in case|in the event|provided|assuming|suppose|supposing"
+    r"|imagine|as long as|except|depending|otherwise|in order of|pending)\b"
+    r"|\b(when|after|while|as soon as|before)(?= (the |a |my |our )?(<\w+>|i|you|we|it|he|she|they|\w+ing"
+    r"|someone|people|lunch|dinner|breakfast|sunset|shift|\w+ (is|are|has|have|arrives?|comes?|goes|leaves?"
+    r"|returns?|starts?|ends?|opens?|closes?))\b)"
+)
+_IF_POLITE = re.compile(
+    r"\b(if|when|whenever|once|as soon as|as long as) (you|it is|it's|that is|at all|there is)?"
+    r" ?(can|could|would|may|like|please|want|wish|get|have|are|possible|convenient|time|ready|free|do"
+    r" not mind|need be|a (chance|moment|minute|second))\b"
+    r"|\b(in case you (missed|have not)|as soon as possible|when (you )?(have|get|find) (a|the|some)"
+    r" (chance|time|moment|minute))\b|\b(when|while) (everything|all) (else|others) (is|are)( all)? done\b"
+    r"|\bafter (all|every|the) (\w+ )?(others?|tasks?|else|rest)\b"
+)
+
+_TOLD = re.compile(
+    r"\b(said|told|claims?|claimed|mentioned|heard|according to|allegedly|rumou?rs?|thinks|believes"
+    r"|supposedly|wrote|states|announced|insists?|suspects?|quote|hearsay|reckons|texted|emailed"
+    r"|reportedly|wants (me|us|you)|asked (me|us|you|for|to|if|whether))\b"
+    r"|\b(?!it\b)\w+ says\b|\b(\w+) (?<!\bbe )(?<!\bto )(reports|reported) (that|there|a|an|seeing)\b"
+)
+_TOLD_BY_ME = re.compile(r"\b(as )?i (said|told you|mentioned|already said)\b")
+
+_PAST = re.compile(
+    r"\b(yesterday|last (week|night|month|time|year|monday|friday)|ago|earlier today|this morning"
+    r"|previously|used to|had been|formerly|back then|the other day|once upon|on monday|in the past)\b"
+    r"|\b(i|we|he|she|they|you|someone|somebody|tom|<robot>|shift|operator|colleague) (have |has |had |"
+    r"just |already |also )*(added|created|registered|cancelled|deleted|paused|stopped|resumed|raised"
+    r"|lowered|changed|released|prioritized|restarted|undid|undone|entered|logged|inserted|reverted"
+    r"|halted|aborted|scheduled|bumped|delivered|finished|completed)\b"
+    r"|\b(task|job|order|<label>|priority|<robot>) (was|were|has been|had been|got|have been) (\w+ )?"
+    r"(added|created|registered|cancelled|deleted|paused|stopped|resumed|raised|lowered|changed|done"
+    r"|released|prioritized|delivered|finished|completed|restarted|entered|bumped)\b"
+    r"|\bthere (was|were|had been)\b"
+)
+_STILL_PAST = re.compile(
+    r"\b(cancelled|withdrawn) by the \w+\b|\bby (mistake|accident|error)\b|\bno longer\b|\bso (please )?\w+"
+)
+
+_DOUBTS = re.compile(
+    r"\b(maybe|perhaps|probably|possibly|presumably|apparently|seemingly|potentially|might|could be|"
+    r"may (?:be|have)|may not|may need|not (?:sure|certain)|unsure|i (?:think|guess|believe|suppose|"
+    r"assume|suspect|feel|reckon|imagine|fear)|seems?|seemed|appears to|looks (?:like|as)|sounds like"
+    r"|not know|kind of|sort of|or something|or whatever|somehow|somewhat|doubt|likely|unclear|or so"
+    r"|if i (?:am|remember)|we (?:should|could|may|might) (?:probably|maybe|perhaps|consider)|not think"
+    r"|considering|thinking (?:about|of)|wonder|guess|supposed to|there should be|some kind|hopefully)\b"
+)
+
+_OR = re.compile(
+    r"(<\w+>) (,|\?)? ?or (the |to |at |in |from |rather |point |room |station |task |maybe )*(<\w+>)"
+    r"|\b(either|one of|any of|whichever|any|whatever|some other|somewhere|someplace|anywhere)\b"
+)
+
+_COMPARES = re.compile(
+    r"<label> (\w+ ){0,4}(before|after|than|over|ahead of|instead of|rather than|as|like|but not|behind"
+    r"|prior to|until) (task |job |the |both )*<label>|\b(before|after|than|over|ahead of|instead of|"
+    r"rather than|swap|exchange|behind|between|same) (\w+ )*<label>"
+    r"|\b(nearest|closest|farthest|furthest|biggest|smallest|longest|shortest|oldest|newest|same)\b"
+)
+
+_LIMITS = re.compile(
+    r"\b(tomorrow|tonight|today|o'clock|noon|midnight|pm|am (?!i)|minutes?|hours?|seconds?|secs?|mins?|"
+    r"monday|tuesday|wednesday|thursday|friday|saturday|sunday|weekly|daily|hourly|every (?:day|hour|"
+    r"morning|time|week|other)|each (?:day|hour|time)|twice|thrice|three times|times|again and again"
+    r"|except|but not|apart from|other than|half of|most of|only if|at least|at most|per|percent|%)"
+    r"(?: |$)"
+)
+_NO_LIMIT = re.compile(
+    r"\b(for|in|hold on|wait|stop|pause) (a|one|some|few|a few) (minutes?|seconds?|moment|hours?)\b"
+    r"|\b(a|one|this) (minute|second|moment)\b|\bmost (?:urgent|important)\b|\bat all times\b"
+)
+
+_UNITS = re.compile(
+    r"(<number>|<point>|\d) ?(feet|foot|ft|inch|inches|yards?|yd|cm|mm|km|kilometers?|kilometres?|miles?"
+    r"|centimeters?|centimetres?|millimeters?|millimetres?|pixels?|cells?|steps?|degrees?|px|tiles?"
+    r"|blocks|paces|grid)\b|\bin (feet|foot|ft|inches|yards|cm|mm|km|centimeters|millimeters|miles|"
+    r"pixels|cells)\b|\b(latitude|longitude|gps)\b"
+)
+
+
+def refused(line: str) -> str | None:
+    """Why an instruction is not read at all: it talks to the machine, not of the mission."""
+    if _REFUSED.search(line):
+        return (
+            "I take instructions about the mission only, and every change is confirmed by a "
+            "person. Say in plain words what is to change, e.g. 'cancel task bb'."
+        )
+    if "<speech>" in line:
+        return (
+            "I do not act on what stands in quotes. Say it in your own words; a name in quotes "
+            "must be one word, e.g. task \"bb\"."
+        )
+    return None
+
+
+def not_meant(line: str, intent: str) -> str | None:
+    """Why words are no instruction although they sound like one; None if they may be one."""
+    if intent != "query_status":
+        asks = line.rstrip().endswith("?") and not _ASKS_FOR.search(line)
+        if _ASKS_ABOUT.search(line) or _ASKS.search(line) or asks:
+            return "That sounds like a question, so I change nothing."
+        if _is_denied(line, intent):
+            return "You say what not to do, so I change nothing."
+        if _IF.search(_IF_POLITE.sub(" ", line)):
+            return "I cannot wait for a condition, so I change nothing yet."
+        if _TOLD.search(_TOLD_BY_ME.sub(" ", line)):
+            return "That is what somebody else says, so I change nothing."
+        if _PAST.search(line) and intent != "undo" and not _excused_past(line, intent):
+            return "That sounds like something that has happened already, so I change nothing."
+        if _LIMITS.search(_NO_LIMIT.sub(" ", line) + " "):
+            return "I cannot keep to times, repetitions or exceptions."
+    return None
+
+
+def _is_denied(line: str, intent: str) -> bool:
+    rest = _NOT_AFTER_ALL.sub(" ", line)
+    if intent in ("remove_obstacle", "cancel_task", "change_task_priority", "robot_failed"):
+        rest = re.sub(r"\b(no|not|has not|have not) (?!to\b)(\w+ )?(<\w+>|need\w*|there)", " ", rest)
+    if intent == "obstacle_update":
+        rest = re.sub(r"\b(no|not) (way|passage|access|go|entry|through\w*|there|yet)\b", " ", rest)
+        if re.search(r"\bthere is no\b|\bno (<kind>|obstacle|wall|blockage)\b", rest):
+            return True
+    if intent == "pause_robot":
+        rest = re.sub(r"\b(do|must|should|may) not (let )?(<robot> )?(move|go|drive|continue)\b", " ", rest)
+    return bool(_NOT.search(rest))
+
+
+def _excused_past(line: str, intent: str) -> bool:
+    if intent == "remove_obstacle" and not re.search(r"\b(yesterday|ago|last|there was)\b", line):
+        return True
+    if intent == "robot_failed" and not re.search(r"\b(yesterday|ago|last)\b", line):
+        return True
+    return intent == "cancel_task" and bool(_STILL_PAST.search(line))
+
+
+def doubtful(line: str, intent: str) -> str | None:
+    """Why words may be an instruction but are too unsure to act on."""
+    if _UNITS.search(line):
+        return "I understand metres only. Give the points in metres, e.g. (5, 19.5)."
+    if _DOUBTS.search(line):
+        return "You sound unsure, so I ask before I propose anything."
+    if intent != "query_status" and _OR.search(line):
+        return "That leaves open which one is meant. Name exactly one."
+    if intent in ("change_task_priority", "cancel_task") and _COMPARES.search(line):
+        return (
+            "I cannot order two tasks against each other; I can make a task high, normal or low "
+            "priority. Say which task and which priority, e.g. 'make bb high'."
+        )
+    return None
+
+
+_HARMLESS = re.compile(r"[^\w]|[a-z]|\d+", re.UNICODE)
+
+
+def strange(tokens: Sequence[Token], words: Container[str]) -> tuple[list[str], int]:
+    """Words that no instruction in training had, and how many plain words there are."""
+    plain = [one for one in tokens if one.kind == "word" and not _HARMLESS.fullmatch(one.text)]
+    return [one.raw for one in plain if one.text not in words], len(plain)
+
+
+_VAGUE = re.compile(
+    r"(?:near|nearby|around|about|roughly|approximately|approx|circa|ca|close to|close by|closer to"
+    r"|next to|beside|besides|behind|opposite|outside|past|beyond|towards|vicinity of|somewhere|by"
+    r"|between|toward|alongside|adjacent to|far from|in front of|side of|north of|south of|east of"
+    r"|west of|left of|right of|surroundings? of|neighbou?rhood of|proximity of|almost|nearly|under"
+    r"|above|below|inside|more or less|corner of|end of|entrance of|exit of|door of|middle of|edge of"
+    r"|entrance to|door to|area around|away from)"
+    r"(?: (?:to|of|the|a|an|at|from|in|room|point|station|place|coordinates?|location|position|area|and"
+    r"|corner|entrance|door|,|\(|\[))*$"
+)
+_VAGUE_AFTER = re.compile(r"^(?:or so|ish|approximately|roughly|more or less|give or take|area|region|or)\b")
+
+
+def is_vague(tokens: Sequence[Token], at: int) -> bool:
+    """Whether the place or point at an index is only the surroundings of what is meant."""
+    before = as_line(tokens[max(at - 8, 0) : at])
+    if tokens[at].kind == "point":
+        before = re.sub(r"\bbetween( the)?( points?| coordinates?)?$", "", before.strip())
+        before = re.sub(r"\b(side|corner|end|entrance|middle|edge|door)s? at$", "", before)
+    return bool(
+        _VAGUE.search(before.strip()) or _VAGUE_AFTER.search(as_line(tokens[at + 1 : at + 5]))
+    )
