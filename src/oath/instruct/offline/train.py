@@ -30,7 +30,7 @@ from oath.instruct.offline.utterances import (
     vocabulary,
 )
 
-STRENGTH = 0.5
+STRENGTH = 0.1
 """How strongly weights are drawn to zero, per utterance."""
 
 

@@ -82,7 +82,7 @@ def vocabulary(rows: list[Line], macros: Mapping[str, str]) -> frozenset[str]:
     return frozenset(word for word in words if len(word) > 1 or word in ("a", "i"))
 
 
-def utterances(seed: int = 0, each: int = 10) -> Iterator[Utterance]:
+def utterances(seed: int = 0, each: int = 14) -> Iterator[Utterance]:
     """Draw up to `each` utterances of every line."""
     rows, macros = lines()
     worlds = [_world(*names, vocabulary(rows, macros)) for names in _WORLDS]
