@@ -5,9 +5,9 @@ from __future__ import annotations
 from oath.commands import Live
 from oath.instruct import Dialogue, Reply
 from oath.instruct.offline.dialogue import follow_up
+from oath.instruct.offline.heard import Heard
 from oath.instruct.offline.model import models
 from oath.instruct.offline.names import Names, tag
-from oath.instruct.offline.slots import Heard
 from oath.instruct.offline.tokens import LONGEST
 from oath.instruct.offline.understand import nothing, understand
 

@@ -10,21 +10,26 @@ from typing import Any
 from oath.commands import COMMANDS
 from oath.errors import did_you_mean
 from oath.instruct import Draft, Reply
-from oath.instruct.offline import gates, slots
+from oath.instruct.offline import gates, new_task, questions, slots
 from oath.instruct.offline.gates import as_line
-from oath.instruct.offline.slots import Filled, Heard
+from oath.instruct.offline.heard import Filled, Heard
 from oath.instruct.offline.tokens import Token
 from oath.instruct.offline.understand import NEEDS, answer, meaning, understand
 
 _DROP = re.compile(
-    r"^(?:\W*(?:no|oh|ok|okay|well|ah|sorry|actually|please|just) )*\W*(?:never ?mind|forget (?:it|that|about it"
-    r"|about that)|drop (?:it|that)|scrap (?:it|that)|leave it|skip it|cancel (?:it|that|this)|abort|stop asking|"
-    r"no thanks?|no thank you|nothing|not needed|let it be|do not bother|i changed my mind|discard (?:it|that)"
-    r"|no|nope|cancel|dismiss|ignore (?:it|that))(?: (?:please|then|anymore|again|now|after all|thanks))*\W*$"
+    r"^(?:\W*(?:no|oh|ok|okay|well|ah|sorry|actually|please|just) )*\W*(?:never ?mind"
+    r"|forget (?:it|that|about it"
+    r"|about that)|drop (?:it|that)|scrap (?:it|that)|leave it|skip it|cancel (?:it|that|this)"
+    r"|abort|stop asking|"
+    r"no thanks?|no thank you|nothing|not needed|let it be|do not bother|i changed my mind"
+    r"|discard (?:it|that)"
+    r"|no|nope|cancel|dismiss|ignore (?:it|that))(?: (?:please|then|anymore|again|now|after all"
+    r"|thanks))*\W*$"
 )
 
 _CORRECTS = re.compile(
-    r"\b(no|not|i mean|i meant|meant|rather|instead|sorry|actually|wrong|correct\w*|change|should be|make (?:it|that)"
+    r"\b(no|not|i mean|i meant|meant|rather|instead|sorry|actually|wrong|correct\w*|change"
+    r"|should be|make (?:it|that)"
     r"|wait|oops|better|set it|it is|it should)\b"
 )
 
@@ -35,6 +40,7 @@ def follow_up(heard: Heard, draft: Draft) -> Reply:
         return Reply(status="clarification", message=why)
     if _DROP.match(heard.line.strip()):
         return Reply(status="clarification", message="Dropped; nothing is changed.")
+    heard = replace(heard, tokens=tuple(_by_number(heard, draft)))
     if _anew(heard, draft):
         return understand(heard)
     filled = Filled(parameters=dict(draft.parameters))
@@ -47,6 +53,17 @@ def follow_up(heard: Heard, draft: Draft) -> Reply:
     if why is not None and not filled.trouble and "not to do" not in why:
         filled.object_to(f"{why} Say it plainly if that is meant.")
     return answer(heard, draft.intent, filled)
+
+
+def _by_number(heard: Heard, draft: Draft) -> list[Token]:
+    """Read ``2`` as robot2 where a robot is asked for."""
+    tokens = list(heard.tokens)
+    if "robot" in COMMANDS[draft.intent].model_fields:
+        for n, token in enumerate(tokens):
+            fits = [one for one in heard.live.state.robots if re.sub(r"\D", "", one) == token.text]
+            if token.kind == "number" and len(fits) == 1:
+                tokens[n] = replace(token, kind="robot", value=fits[0])
+    return tokens
 
 
 def _again(heard: Heard, draft: Draft) -> Reply:
@@ -64,7 +81,7 @@ def _again(heard: Heard, draft: Draft) -> Reply:
         intent=draft.intent,
         parameters=draft.parameters,
         missing=draft.missing,
-        message="I do not understand that. " + slots.ask(heard, draft.missing),
+        message="I do not understand that. " + questions.ask(heard, draft.missing),
     )
 
 
@@ -146,15 +163,17 @@ def _plain(token: Token) -> Any:
 _TO = re.compile(
     r"\b(to|deliver\w*|destination|drop\w*|goes|bring|take|target|for|ends?|unload|towards|into)\b"
 )
-_FROM = re.compile(r"\b(from|pick\w*|collect|fetch|starts?|source|origin|location|located|get it|waits?)\b")
+_FROM = re.compile(
+    r"\b(from|pick\w*|collect|fetch|starts?|source|origin|location|located|get it|waits?)\b"
+)
 
 
 def _fill_task(heard: Heard, draft: Draft, filled: Filled) -> None:
     extra = Filled()
-    slots.read_new_label(heard, extra)
-    slots.read_type(heard, extra)
+    new_task.read_new_label(heard, extra)
+    new_task.read_type(heard, extra)
     filled.trouble = extra.trouble
-    said = slots.said_priority(heard.line)
+    said = new_task.said_priority(heard.line)
     if len(said) == 1:
         extra.parameters["priority"] = said.pop()
     filled.parameters |= extra.parameters
@@ -168,19 +187,19 @@ def _fill_task(heard: Heard, draft: Draft, filled: Filled) -> None:
     if len(spots) > 2:
         filled.object_to("Which is where it is picked up, and which where it goes?")
     elif len(spots) == 2:
-        roles = slots.assign_roles(heard, spots) or {spots[0]: "pickup", spots[1]: "delivery"}
+        roles = new_task.assign_roles(heard, spots) or {spots[0]: "pickup", spots[1]: "delivery"}
         for at, role in roles.items():
             name = "location" if role == "pickup" else "delivery_point"
-            slots.read_spot(heard, filled, name, at)
+            new_task.read_spot(heard, filled, name, at)
     elif spots:
-        name = _asked_spot(heard, draft, spots[0])
-        if name is None:
+        asked_for = _asked_spot(heard, draft, spots[0])
+        if asked_for is None:
             raw = heard.tokens[spots[0]].raw
             filled.object_to(
                 f"Is {raw} where it is picked up or where it goes? Say 'from {raw}' or 'to {raw}'."
             )
         else:
-            slots.read_spot(heard, filled, name, spots[0])
+            new_task.read_spot(heard, filled, asked_for, spots[0])
 
 
 def _asked_spot(heard: Heard, draft: Draft, at: int) -> str | None:
@@ -210,14 +229,16 @@ def _fill_obstacle(heard: Heard, filled: Filled) -> None:
     for n, token in enumerate(heard.tokens):
         if token.kind == "point":
             if gates.is_vague(heard.tokens, n):
-                filled.object_to(f"That must be exact. {slots.ask_extent()}", "obstacle_location")
+                filled.object_to(
+                    f"That must be exact. {questions.ask_extent()}", "obstacle_location"
+                )
                 return
             points.append(token.value)
     known = [tuple(one) for one in filled.parameters.get("obstacle_location", ())]
     if len(points) == 1 and len(known) == 1 and points != known:
         points = [*known, *points]
     elif len(points) == 1 and len(known) > 1:
-        filled.object_to(f"Which point is that? {slots.ask_extent()}", "obstacle_location")
+        filled.object_to(f"Which point is that? {questions.ask_extent()}", "obstacle_location")
         return
     if points:
         slots.add_points(heard, filled, points)
@@ -225,7 +246,7 @@ def _fill_obstacle(heard: Heard, filled: Filled) -> None:
 
 def _fill_label(heard: Heard, draft: Draft, filled: Filled) -> None:
     if draft.intent == "change_task_priority":
-        said = slots.said_priority(heard.line)
+        said = new_task.said_priority(heard.line)
         said |= {one.text for one in heard.tokens if one.text in ("low", "normal", "high")}
         if len(said) == 1:
             filled.parameters["priority"] = said.pop()
@@ -237,7 +258,7 @@ def _fill_label(heard: Heard, draft: Draft, filled: Filled) -> None:
         slots.read_task(heard, filled)
     elif words := _strange_name(heard):
         filled.object_to(
-            f"There is no task '{words.raw}'. {slots.ask_label(heard)}", "task_label"
+            f"There is no task '{words.raw}'. {questions.ask_label(heard)}", "task_label"
         )
 
 
@@ -257,8 +278,6 @@ def _fill_name(heard: Heard, filled: Filled, name: str, known: Sequence[str]) ->
         filled.parameters.pop(name, None)
         filled.parameters[name] = filled.several[0]
     elif word := next(iter(heard.of(f"unknown_{name}")), None) or _strange_name(heard):
-        filled.object_to(f"There is no {name} '{word.raw}'; {did_you_mean(word.text, list(known))}", name)
-    elif "robot" == name and (numbers := heard.of("number")):
-        fits = [one for one in known if re.sub(r"\D", "", one) == numbers[0].text]
-        if len(numbers) == 1 and len(fits) == 1:
-            filled.parameters[name] = fits[0]
+        filled.object_to(
+            f"There is no {name} '{word.raw}'; {did_you_mean(word.text, list(known))}", name
+        )

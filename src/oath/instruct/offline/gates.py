@@ -17,13 +17,16 @@ def as_line(tokens: Sequence[Token]) -> str:
 
 
 _REFUSED = re.compile(
-    r"\b(ignore|disregard|forget|override|bypass) (\w+ ){0,3}(instructions?|rules?|prompts?|commands?"
+    r"\b(ignore|disregard|forget|override|bypass) (\w+ ){0,3}(instructions?|rules?|prompts?"
+    r"|commands?"
     r"|checks?|confirmations?|safety|everything|above|previous|restrictions?|guidelines?)\b"
     r"|\b(system prompt|developer mode|jailbreak|you are now|act as|pretend|password|api key"
-    r"|without (asking|confirming|confirmation|any confirmation|a confirmation)|do not ask|no questions"
+    r"|without (asking|confirming|confirmation|any confirmation|a confirmation)|do not ask"
+    r"|no questions"
     r"|auto ?-?confirm\w*|confirm (it|this|that|everything|automatically|yourself)|self-confirm"
     r"|already (confirmed|approved)|approve (it|this|everything))\b"
-    r"|\b(system|assistant|developer|admin|root) :|[{}<$\\](?!(point|place|robot|label|obstacle|kind"
+    r"|\b(system|assistant|developer|admin|root) :|[{}<$\\](?!(point|place|robot|label|obstacle"
+    r"|kind"
     r"|type|number|speech|unknown_\w+)>)"
 )
 
@@ -37,28 +40,42 @@ _VERB = (
 )
 
 _NOT = re.compile(
-    rf"\b(do|please|never|should|must|would|need|to|can|could|may|shall|will) not (?:\w+ )?{_VERB}\b"
-    rf"|\b(never|not|rather not|refrain from|avoid|instead of|without|stop) (?:to )?{_VERB}(?:ing|ting"
-    rf"|ping|ning)?\b|\bno (?:need|reason|point|use|way)\b|\bby no means\b|\bunder no circumstances\b"
-    r"|\b(adding|creating|cancelling|pausing|stopping|removing|resuming|raising) \w+ is (not|wrong)\b"
-    r"|\bdid not\b|\b(has|have|had) not\b|\bneither\b|\b(is|are|am) not (going|planning|asking|saying)\b"
+    rf"\b(do|please|never|should|must|would|need|to|can|could|may|shall"
+    rf"|will) not (?:\w+ )?{_VERB}\b"
+    rf"|\b(never|not|rather not|refrain from|avoid|instead of|without"
+    rf"|stop) (?:to )?{_VERB}(?:ing|ting"
+    rf"|ping|ning)?\b|\bno (?:need|reason|point|use|way)\b|\bby no means\b"
+    rf"|\bunder no circumstances\b"
+    r"|\b(adding|creating|cancelling|pausing|stopping|removing|resuming|raising) \w+ is (not"
+    r"|wrong)\b"
+    r"|\bdid not\b|\b(has|have|had) not\b|\bneither\b|\b(is|are|am) not (going|planning|asking"
+    r"|saying)\b"
     r"|\bnot (a|an|the|<\w+>|yet|now|today)\b|\bno (new|more)? ?(task|job|order)s?\b|\bnever\b"
 )
 _NOT_AFTER_ALL = re.compile(
-    r"\b(do not|never) (forget|hesitate|delay|wait|postpone|put off|be late|miss|lose time|leave)\b"
-    r"|\b(do|does|did|can|could|may|must|should|will|would|shall) (not|no longer) (\w+ )?(pass|drive|"
+    r"\b(do not|never) (mind|forget|hesitate|delay|wait|postpone|put off|be late|miss|lose time"
+    r"|leave)\b"
+    r"|\b(do|does|did|can|could|may|must|should|will|would|shall) (not|no longer) (\w+ )?(pass"
+    r"|drive|"
     r"go|enter|get|move|work|respond|answer|react|start|cross|run|reach|use|wait|be|seem|look|need|"
-    r"want|exist|block|fit|traverse|turn|reply|function|operate|stand|matter|communicate|continue|"
-    r"boot|have|count|rely|think|rush|hurry|take|let|care|travel|navigate|proceed|know)\b"
-    r"|\bno need (for|to)\b|\bno (longer|more|rush|hurry|urgency)\b|\bnot (any|so|that|very|too|really"
+    r"want(?! to)|exist|block|fit|traverse|turn|reply|function|operate|stand|matter|communicate"
+    r"|continue|"
+    r"boot|have|count|rely|think(?! we| i)|rush|hurry|take|let|care|travel|navigate|proceed|know)\b"
+    r"|\bno need (for|to (hurry|rush|wait|do|deliver|fetch|handle|pick|bother|hold|keep)\b)"
+    r"|\bno (longer|more|rush|hurry|urgency)\b|\bnot (any|so|that|very|too|really"
     r"|urgent|important|needed|in a hurry|as)\b|\bneed not\b|\bnot a priority\b|\bnot (\w+ing)\b"
     r"|\b(is|are) not (?!going|planning|asking|saying)"
 )
 
 _ASKS = re.compile(
-    r"^(?:\W*(?:and|but|so|hey|hi|hello|ok|okay|well|um|sorry|please|now) )*(?:is|are|was|were|do"
-    r"|does|did|has|have|had|why|who|whose|when|how|what|where|which|should|shall|must|may i|might"
-    r"|am)\b(?! (?:about|fetch|collect|pick) )"
+    r"^(?:\W*(?:and|but|so|hey|hi|hello|ok|okay|well|um|sorry|please|now) )*(?:(?:is|are|was"
+    r"|were|does|did"
+    r"|has|had|why|who|whose|what|where|am)\b|how (?!about)|which (?!is\b)|when (?:is|are|was"
+    r"|will|do|does|did"
+    r"|can|should)\b|(?:do|have|should|shall|must|may|might) (?:you|we|i|they|it|he|she|the|a"
+    r"|any|robots"
+    r"|there|somebody|someone|anyone|<\w+>|this|that)\b)(?! (?:wait|stop|pause|continue|go|done"
+    r"|sit) )"
 )
 _ASKS_FOR = re.compile(
     r"\b(can|could|would|will|may|might) (you|we|i|somebody|someone|<robot>|u|one|anybody|anyone)\b"
@@ -66,86 +83,116 @@ _ASKS_FOR = re.compile(
     r"|\bpossible to\b|\blet us\b|\bshall we\b|\bplease\b"
 )
 _ASKS_ABOUT = re.compile(
-    r"\b(wonder|wondering|know|tell (me|us)|ask(ing)?|check|find out|see|sure|curious|doubt) (if|whether"
-    r"|why|when|who|what|how|where)\b|\bwhat if\b|\bright \?$|\b(is|are|was) (it|there|that) not \?$"
+    r"\b(wonder|wondering|know|tell (me|us)|ask(ing)?|check|find out|see|sure|curious"
+    r"|doubt) (if|whether"
+    r"|why|when|who|what|how|where)\b|\bwhat if\b|\bright \?$|\b(is|are|was) (it|there"
+    r"|that) not \?$"
     r"|\b(not|correct|yes|no) \?$"
 )
 
 _IF = re.compile(
-    r"\b(if|unless|until|till|once|whenever|in case|in the event|provided|assuming|suppose|supposing"
+    r"\b(if|unless|until(?! further| i say)|till(?! further| i say)|(?<!at )once|whenever"
+    r"|in case|in the event|provided|assuming|suppose|supposing"
     r"|imagine|as long as|except|depending|otherwise|in order of|pending)\b"
-    r"|\b(when|after|while|as soon as|before)(?= (the |a |my |our )?(<\w+>|i|you|we|it|he|she|they|\w+ing"
-    r"|someone|people|lunch|dinner|breakfast|sunset|shift|\w+ (is|are|has|have|arrives?|comes?|goes|leaves?"
+    r"|\b(when|after|while|as soon as|before)(?= (the |a |my |our )?(<\w+>|i|you|we|it|he|she"
+    r"|they|(?!\w+thing)\w+ing"
+    r"|someone|people|lunch|dinner|breakfast|sunset|shift|\w+ (is|are|has|have|arrives?|comes?"
+    r"|goes|leaves?"
     r"|returns?|starts?|ends?|opens?|closes?))\b)"
 )
 _IF_POLITE = re.compile(
     r"\b(if|when|whenever|once|as soon as|as long as) (you|it is|it's|that is|at all|there is)?"
-    r" ?(can|could|would|may|like|please|want|wish|get|have|are|possible|convenient|time|ready|free|do"
+    r" ?(can|could|would|may|like|please|want|wish|get|have|are|possible|convenient|time|ready"
+    r"|free|do"
     r" not mind|need be|a (chance|moment|minute|second))\b"
-    r"|\b(in case you (missed|have not)|as soon as possible|when (you )?(have|get|find) (a|the|some)"
-    r" (chance|time|moment|minute))\b|\b(when|while) (everything|all) (else|others) (is|are)( all)? done\b"
+    r"|\b(in case you (missed|have not)|as soon as possible|when (you )?(have|get|find) (a|the"
+    r"|some)"
+    r" (chance|time|moment|minute))\b|\b(when|while) (everything|all) (else|others) (is"
+    r"|are)( all)? done\b"
     r"|\bafter (all|every|the) (\w+ )?(others?|tasks?|else|rest)\b"
 )
 
 _TOLD = re.compile(
-    r"\b(said|told|claims?|claimed|mentioned|heard|according to|allegedly|rumou?rs?|thinks|believes"
+    r"\b(said|told|(?:i|we) (?:have |just )?read(?: that)?|claims?|claimed|mentioned|heard"
+    r"|according to|allegedly|rumou?rs?|thinks|believes"
     r"|supposedly|wrote|states|announced|insists?|suspects?|quote|hearsay|reckons|texted|emailed"
-    r"|reportedly|wants (me|us|you)|asked (me|us|you|for|to|if|whether))\b"
-    r"|\b(?!it\b)\w+ says\b|\b(\w+) (?<!\bbe )(?<!\bto )(reports|reported) (that|there|a|an|seeing)\b"
+    r"|reportedly|wants (me|us|you)|asked (me|us|you|to|if|whether))\b"
+    r"|\b(?!it\b)\w+ says\b|\b(\w+) (?<!\bbe )(?<!\bto )(reports|reported) (that|there|a|an"
+    r"|seeing)\b"
 )
 _TOLD_BY_ME = re.compile(r"\b(as )?i (said|told you|mentioned|already said)\b")
 
 _PAST = re.compile(
     r"\b(yesterday|last (week|night|month|time|year|monday|friday)|ago|earlier today|this morning"
-    r"|previously|used to|had been|formerly|back then|the other day|once upon|on monday|in the past)\b"
-    r"|\b(i|we|he|she|they|you|someone|somebody|tom|<robot>|shift|operator|colleague) (have |has |had |"
-    r"just |already |also )*(added|created|registered|cancelled|deleted|paused|stopped|resumed|raised"
+    r"|previously|used to|had been|formerly|back then|the other day|once upon|on monday"
+    r"|in the past)\b"
+    r"|\b(i|we|he|she|they|you|someone|somebody|tom|<robot>|shift|operator|colleague) (have "
+    r"|has |had |"
+    r"just |already |also )*(added|created|registered|cancelled|deleted|paused|stopped|resumed"
+    r"|raised"
     r"|lowered|changed|released|prioritized|restarted|undid|undone|entered|logged|inserted|reverted"
     r"|halted|aborted|scheduled|bumped|delivered|finished|completed)\b"
-    r"|\b(task|job|order|<label>|priority|<robot>) (was|were|has been|had been|got|have been) (\w+ )?"
-    r"(added|created|registered|cancelled|deleted|paused|stopped|resumed|raised|lowered|changed|done"
+    r"|\b(task|job|order|<label>|priority|<robot>) (was|were|has been|had been|got"
+    r"|have been) (\w+ )?"
+    r"(added|created|registered|cancelled|deleted|paused|stopped|resumed|raised|lowered|changed"
+    r"|done"
     r"|released|prioritized|delivered|finished|completed|restarted|entered|bumped)\b"
     r"|\bthere (was|were|had been)\b"
 )
 _STILL_PAST = re.compile(
-    r"\b(cancelled|withdrawn) by the \w+\b|\bby (mistake|accident|error)\b|\bno longer\b|\bso (please )?\w+"
+    r"\b(cancelled|withdrawn) by the \w+\b|\bchanged my mind\b|\bby (mistake|accident|error)\b"
+    r"|\bno longer\b|\bso (please )?\w+"
 )
 
 _DOUBTS = re.compile(
-    r"\b(maybe|perhaps|probably|possibly|presumably|apparently|seemingly|potentially|might|could be|"
-    r"may (?:be|have)|may not|may need|not (?:sure|certain)|unsure|i (?:think|guess|believe|suppose|"
-    r"assume|suspect|feel|reckon|imagine|fear)|seems?|seemed|appears to|looks (?:like|as)|sounds like"
-    r"|not know|kind of|sort of|or something|or whatever|somehow|somewhat|doubt|likely|unclear|or so"
-    r"|if i (?:am|remember)|we (?:should|could|may|might) (?:probably|maybe|perhaps|consider)|not think"
-    r"|considering|thinking (?:about|of)|wonder|guess|supposed to|there should be|some kind|hopefully)\b"
+    r"\b(maybe|perhaps|probably|possibly|presumably|apparently|seemingly|potentially|might"
+    r"|could be|"
+    r"may (?:be|have)|may not|may need|not (?:sure|certain)|unsure|i (?:think|guess|believe"
+    r"|suppose|"
+    r"assume|suspect|feel|reckon|imagine|fear)|seems?|seemed|appears to|looks (?:like|as)"
+    r"|sounds like"
+    r"|not know|kind of|sort of|or something|or whatever|somehow|somewhat|doubt|likely|unclear"
+    r"|or so"
+    r"|if i (?:am|remember)|we (?:should|could|may|might) (?:probably|maybe|perhaps|consider)"
+    r"|not think"
+    r"|considering|thinking (?:about|of)|wonder|guess|supposed to|there should be|some kind"
+    r"|hopefully)\b"
 )
 
 _OR = re.compile(
-    r"(<\w+>) (,|\?)? ?or (the |to |at |in |from |rather |point |room |station |task |maybe )*(<\w+>)"
-    r"|\b(either|one of|any of|whichever|any|whatever|some other|somewhere|someplace|anywhere)\b"
+    r"(<\w+>) (,|\?)? ?or (the |to |at |in |from |rather |point |room |station |task "
+    r"|maybe )*(<\w+>)"
+    r"|\b(either|any of|one of (?:them|these|those)|whichever|some other|somewhere|someplace"
+    r"|anywhere)\b"
 )
 
 _COMPARES = re.compile(
-    r"<label> (\w+ ){0,4}(before|after|than|over|ahead of|instead of|rather than|as|like|but not|behind"
-    r"|prior to|until) (task |job |the |both )*<label>|\b(before|after|than|over|ahead of|instead of|"
+    r"<label> (\w+ ){0,4}(before|after|than|over|ahead of|instead of|rather than|as|like"
+    r"|but not|behind"
+    r"|prior to|until) (task |job |the |both )*<label>|\b(before|after|than|over|ahead of"
+    r"|instead of|"
     r"rather than|swap|exchange|behind|between|same) (\w+ )*<label>"
     r"|\b(nearest|closest|farthest|furthest|biggest|smallest|longest|shortest|oldest|newest|same)\b"
 )
 
 _LIMITS = re.compile(
-    r"\b(tomorrow|tonight|today|o'clock|noon|midnight|pm|am (?!i)|minutes?|hours?|seconds?|secs?|mins?|"
-    r"monday|tuesday|wednesday|thursday|friday|saturday|sunday|weekly|daily|hourly|every (?:day|hour|"
-    r"morning|time|week|other)|each (?:day|hour|time)|twice|thrice|three times|times|again and again"
+    r"\b(tomorrow|tonight|o'clock|noon|midnight|pm|am (?!i)|minutes?|hours?|seconds?|secs?|mins?|"
+    r"monday|tuesday|wednesday|thursday|friday|saturday|sunday|weekly|daily|hourly|every (?:day"
+    r"|hour|"
+    r"morning|time|week|other)|each (?:day|hour|time)|twice|thrice|three times|times"
+    r"|again and again"
     r"|except|but not|apart from|other than|half of|most of|only if|at least|at most|per|percent|%)"
     r"(?: |$)"
 )
 _NO_LIMIT = re.compile(
-    r"\b(for|in|hold on|wait|stop|pause) (a|one|some|few|a few) (minutes?|seconds?|moment|hours?)\b"
-    r"|\b(a|one|this) (minute|second|moment)\b|\bmost (?:urgent|important)\b|\bat all times\b"
+    r"\b(for|hold on|wait|stop|pause) (a|one|some|few|a few) (minutes?|seconds?|moment|hours?)\b"
+    r"|\b(a|one|this) (minute|second|moment|sec|min)\b|\bmost (?:urgent|important)\b"
+    r"|\bat all times\b"
 )
 
 _UNITS = re.compile(
-    r"(<number>|<point>|\d) ?(feet|foot|ft|inch|inches|yards?|yd|cm|mm|km|kilometers?|kilometres?|miles?"
+    r"(<number>|<point>|\d) ?(feet|foot|ft|inch|inches|yards?|yd|cm|mm|km|kilometers?"
+    r"|kilometres?|miles?"
     r"|centimeters?|centimetres?|millimeters?|millimetres?|pixels?|cells?|steps?|degrees?|px|tiles?"
     r"|blocks|paces|grid)\b|\bin (feet|foot|ft|inches|yards|cm|mm|km|centimeters|millimeters|miles|"
     r"pixels|cells)\b|\b(latitude|longitude|gps)\b"
@@ -162,15 +209,20 @@ def refused(line: str) -> str | None:
     if "<speech>" in line:
         return (
             "I do not act on what stands in quotes. Say it in your own words; a name in quotes "
-            "must be one word, e.g. task \"bb\"."
+            'must be one word, e.g. task "bb".'
         )
     return None
 
 
 def not_meant(line: str, intent: str) -> str | None:
     """Why words are no instruction although they sound like one; None if they may be one."""
-    if intent != "query_status":
+    if intent == "undo":
+        if re.search(r"\b(not|never) (\w+ )?(undo|revert|reverse|take|roll|go|change)\b", line):
+            return "You say what not to do, so I change nothing."
+    elif intent != "query_status":
         asks = line.rstrip().endswith("?") and not _ASKS_FOR.search(line)
+        if intent == "robot_failed":
+            asks = asks or bool(re.match(r"(can|could|would|will|might|may) (?!not)", line))
         if _ASKS_ABOUT.search(line) or _ASKS.search(line) or asks:
             return "That sounds like a question, so I change nothing."
         if _is_denied(line, intent):
@@ -179,7 +231,7 @@ def not_meant(line: str, intent: str) -> str | None:
             return "I cannot wait for a condition, so I change nothing yet."
         if _TOLD.search(_TOLD_BY_ME.sub(" ", line)):
             return "That is what somebody else says, so I change nothing."
-        if _PAST.search(line) and intent != "undo" and not _excused_past(line, intent):
+        if _PAST.search(line) and not _excused_past(line, intent):
             return "That sounds like something that has happened already, so I change nothing."
         if _LIMITS.search(_NO_LIMIT.sub(" ", line) + " "):
             return "I cannot keep to times, repetitions or exceptions."
@@ -189,20 +241,33 @@ def not_meant(line: str, intent: str) -> str | None:
 def _is_denied(line: str, intent: str) -> bool:
     rest = _NOT_AFTER_ALL.sub(" ", line)
     if intent in ("remove_obstacle", "cancel_task", "change_task_priority", "robot_failed"):
-        rest = re.sub(r"\b(no|not|has not|have not) (?!to\b)(\w+ )?(<\w+>|need\w*|there)", " ", rest)
+        rest = re.sub(
+            r"\b(no|not|has not|have not) (longer |more )?(<\w+>|need\w*|there)", " ", rest
+        )
+    if intent == "cancel_task":
+        rest = re.sub(
+            r"\bnot (\w+ ){1,2}(task |job )?<label> (any ?more|any longer|at all|after all)",
+            " ",
+            rest,
+        )
+        rest = re.sub(r"\b(not|never) (bother|waste|trouble)\b", " ", rest)
     if intent == "obstacle_update":
         rest = re.sub(r"\b(no|not) (way|passage|access|go|entry|through\w*|there|yet)\b", " ", rest)
         if re.search(r"\bthere is no\b|\bno (<kind>|obstacle|wall|blockage)\b", rest):
             return True
     if intent == "pause_robot":
-        rest = re.sub(r"\b(do|must|should|may) not (let )?(<robot> )?(move|go|drive|continue)\b", " ", rest)
+        rest = re.sub(
+            r"\b(do|must|should|may) not (let )?(<robot> )?(move|go|drive|continue)\b", " ", rest
+        )
     return bool(_NOT.search(rest))
 
 
 def _excused_past(line: str, intent: str) -> bool:
     if intent == "remove_obstacle" and not re.search(r"\b(yesterday|ago|last|there was)\b", line):
         return True
-    if intent == "robot_failed" and not re.search(r"\b(yesterday|ago|last)\b", line):
+    if intent == "robot_failed" and not re.search(
+        r"\b(yesterday|ago|last|this morning|earlier|had been)\b", line
+    ):
         return True
     return intent == "cancel_task" and bool(_STILL_PAST.search(line))
 
@@ -223,6 +288,36 @@ def doubtful(line: str, intent: str) -> str | None:
     return None
 
 
+_AGAINST = {
+    "obstacle_update": r"\b(remove\w*|delete|erase|reopen\w*|unblock\w*|get rid|gone|cleared|free|lift|open|again|"
+    r"disappeared|unmark|no (longer|more) (a |an |any )?(<kind>|obstacle|there|blocked|closed)"
+    r"|passable again|clear"
+    r"(?! of))\b",
+    "robot_failed": r"\b(repair(ed)?|fix(ed)?|alive|fine|ok|okay|recovered|works|working well|is working|charge|again|back|reboot)\b(?! and)",
+    "resume_robot": r"(?<!off )(?<!the )\b(stop|pause|hold|halt|wait|freeze)$",
+    "cancel_task": r"\b(not|never) (\w+ )?(forget|miss|lose)\b",
+    "add_task": r"\b(cancel|delete|remove|abort|undo|wall|obstacle|blocked)\b",
+}
+"""Words that speak against an intent, however likely the rest makes it."""
+
+
+def speaks_against(line: str, intent: str) -> bool:
+    """Whether a word says the opposite of an intent."""
+    if intent == "obstacle_update" and not re.search(
+        r"(?<!<)\b(?!to\b|from\b|and\b|at\b)[a-z]+\b(?!>)", line
+    ):
+        return "<kind>" not in line
+    pattern = _AGAINST.get(intent)
+    if intent in ("obstacle_update", "robot_failed"):
+        line = re.sub(r"\b(not|no|never|cannot|no longer) (\w+ )?(\w+)\b", " ", line)
+        line = re.sub(
+            r"\b(needs?|must|has to|had to|out|beyond|to be|in) (\w+ )?(repair\w*|fix\w*)\b",
+            " ",
+            line,
+        )
+    return pattern is not None and bool(re.search(pattern, line.strip(" .!")))
+
+
 _HARMLESS = re.compile(r"[^\w]|[a-z]|\d+", re.UNICODE)
 
 
@@ -237,17 +332,22 @@ _VAGUE = re.compile(
     r"|next to|beside|besides|behind|opposite|outside|past|beyond|towards|vicinity of|somewhere|by"
     r"|between|toward|alongside|adjacent to|far from|in front of|side of|north of|south of|east of"
     r"|west of|left of|right of|surroundings? of|neighbou?rhood of|proximity of|almost|nearly|under"
-    r"|above|below|inside|more or less|corner of|end of|entrance of|exit of|door of|middle of|edge of"
+    r"|above|below|inside|more or less|corner of|end of|entrance of|exit of|door of|middle of"
+    r"|edge of"
     r"|entrance to|door to|area around|away from)"
-    r"(?: (?:to|of|the|a|an|at|from|in|room|point|station|place|coordinates?|location|position|area|and"
+    r"(?: (?:to|of|the|a|an|at|from|in|room|point|station|place|coordinates?|location|position"
+    r"|area|and"
     r"|corner|entrance|door|,|\(|\[))*$"
 )
-_VAGUE_AFTER = re.compile(r"^(?:or so|ish|approximately|roughly|more or less|give or take|area|region|or)\b")
+_VAGUE_AFTER = re.compile(
+    r"^(?:or so|ish|approximately|roughly|more or less|give or take|area|region|or)\b"
+)
 
 
 def is_vague(tokens: Sequence[Token], at: int) -> bool:
     """Whether the place or point at an index is only the surroundings of what is meant."""
     before = as_line(tokens[max(at - 8, 0) : at])
+    before = re.sub(r"[\[(, ]+$", "", before)
     if tokens[at].kind == "point":
         before = re.sub(r"\bbetween( the)?( points?| coordinates?)?$", "", before.strip())
         before = re.sub(r"\b(side|corner|end|entrance|middle|edge|door)s? at$", "", before)

@@ -18,7 +18,26 @@ WEIGHTS = "weights.npz"
 """What `train` writes and this module reads."""
 
 _FILLERS = frozenset(
-    "a an the please hey hi hello ok okay so well kindly thanks thank uh um er just".split()
+    [
+        "a",
+        "an",
+        "the",
+        "please",
+        "hey",
+        "hi",
+        "hello",
+        "ok",
+        "okay",
+        "so",
+        "well",
+        "kindly",
+        "thanks",
+        "thank",
+        "uh",
+        "um",
+        "er",
+        "just",
+    ]
 )
 _LONGEST = 80
 """Tokens that features are made of."""

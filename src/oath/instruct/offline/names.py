@@ -41,10 +41,93 @@ ALL_ROBOTS = re.compile(
 )
 
 _COMMON = frozenset(
-    "a an and at be by can do does did done for from go going had has have he her him his i if in "
-    "is it its me my need needs no not now of off on one or our out please she so some task tasks "
-    "that the their them then there they this those to up us was we were what when where which who "
-    "why will with would you your high low normal urgent first last next new job point room".split()
+    [
+        "a",
+        "an",
+        "and",
+        "at",
+        "be",
+        "by",
+        "can",
+        "do",
+        "does",
+        "did",
+        "done",
+        "for",
+        "from",
+        "go",
+        "going",
+        "had",
+        "has",
+        "have",
+        "he",
+        "her",
+        "him",
+        "his",
+        "i",
+        "if",
+        "in",
+        "is",
+        "it",
+        "its",
+        "me",
+        "my",
+        "need",
+        "needs",
+        "no",
+        "not",
+        "now",
+        "of",
+        "off",
+        "on",
+        "one",
+        "or",
+        "our",
+        "out",
+        "please",
+        "she",
+        "so",
+        "some",
+        "task",
+        "tasks",
+        "that",
+        "the",
+        "their",
+        "them",
+        "then",
+        "there",
+        "they",
+        "this",
+        "those",
+        "to",
+        "up",
+        "us",
+        "was",
+        "we",
+        "were",
+        "what",
+        "when",
+        "where",
+        "which",
+        "who",
+        "why",
+        "will",
+        "with",
+        "would",
+        "you",
+        "your",
+        "high",
+        "low",
+        "normal",
+        "urgent",
+        "first",
+        "last",
+        "next",
+        "new",
+        "job",
+        "point",
+        "room",
+    ]
 )
 
 
@@ -235,7 +318,10 @@ def _all_robots(tokens: Sequence[Token]) -> list[Token]:
             part = done[at : at + size]
             plain = len(part) == size and all(one.kind == "word" for one in part)
             said = " ".join(one.text for one in part)
-            if plain and ALL_ROBOTS.fullmatch(said):
+            part_of = (
+                said[:4] == "the " and at > 0 and done[at - 1].text in ("from", "of", "to", "in")
+            )
+            if plain and not part_of and ALL_ROBOTS.fullmatch(said):
                 done[at : at + size] = [Token("robot", said, "all", said)]
                 break
         at += 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 LONGEST = 600
@@ -138,11 +138,20 @@ def _signed(tokens: list[Token]) -> list[Token]:
 
 # -- numbers in words
 
-_ONES = "zero one two three four five six seven eight nine".split()
-_TEENS = (
-    "ten eleven twelve thirteen fourteen fifteen sixteen seventeen eighteen nineteen".split()
-)
-_TENS = "twenty thirty forty fifty sixty seventy eighty ninety".split()
+_ONES = ["zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine"]
+_TEENS = [
+    "ten",
+    "eleven",
+    "twelve",
+    "thirteen",
+    "fourteen",
+    "fifteen",
+    "sixteen",
+    "seventeen",
+    "eighteen",
+    "nineteen",
+]
+_TENS = ["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"]
 _CARDINALS = {
     **{word: n for n, word in enumerate(_ONES + _TEENS)},
     **{word: 10 * n for n, word in enumerate(_TENS, 2)},
@@ -256,7 +265,7 @@ def _not_one(tokens: Sequence[Token], at: int) -> Token:
     token = tokens[at]
     if token.kind != "number" or token.text != "one":
         return token
-    skip = {",", "and", "(", "[", ";"}
+    skip = {",", "and", ";"}
     before = next((one for one in reversed(tokens[:at]) if one.text not in skip), None)
     after = next((one for one in tokens[at + 1 :] if one.text not in skip), None)
     if any(one is not None and one.kind == "number" for one in (before, after)):
@@ -343,10 +352,10 @@ def _by_axes(tokens: Sequence[Token], at: int) -> tuple[list[Token], int]:
 
 def _run(tokens: Sequence[Token], at: int, before: Token | None) -> tuple[list[Token], int]:
     """Read numbers in a row as pairs, if their number and what separates them allow it."""
-    numbers, gaps, end = [tokens[at]], [], at + 1
+    numbers, gaps, end = [tokens[at]], list[str](), at + 1
     here = end
     while here < len(tokens):
-        gap = []
+        gap: list[str] = []
         while here < len(tokens) and tokens[here].text in _METERS:
             here += 1
         end = here
@@ -370,8 +379,3 @@ def _run(tokens: Sequence[Token], at: int, before: Token | None) -> tuple[list[T
         return [], end
     pairs = zip(numbers[::2], numbers[1::2], strict=True)
     return [_point((a.value, b.value)) for a, b in pairs], end
-
-
-def unquote(token: Token) -> Token:
-    """Return a token as if it stood in no quotes."""
-    return replace(token, quoted=False)

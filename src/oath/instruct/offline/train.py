@@ -104,7 +104,7 @@ def pack(models: Models) -> bytes:
         arrays[f"{name}_bias"] = one.bias.round(4)
         arrays[f"{name}_scale"] = np.array(scale)
     buffer = io.BytesIO()
-    np.savez_compressed(buffer, **arrays)
+    np.savez_compressed(buffer, allow_pickle=False, **arrays)
     return buffer.getvalue()
 
 

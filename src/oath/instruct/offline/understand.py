@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from pydantic import ValidationError
 
-from oath.commands import COMMANDS, AddTask, Command
-from oath.errors import BadInput
+from oath.commands import COMMANDS, Command
 from oath.instruct import Reply
-from oath.instruct.offline import gates, slots
-from oath.instruct.offline.slots import Filled, Heard
+from oath.instruct.offline import gates, questions, slots
+from oath.instruct.offline.heard import Filled, Heard
 from oath.instruct.offline.tokens import Token
 
 LIKELY = 0.5
@@ -104,14 +103,50 @@ def _one(heard: Heard) -> Reply:
         kept = None if "not to do" in denied else meant.intent
         say = f"{denied} Say it plainly if I shall {ABOUT[meant.intent]}."
         return Reply(status="clarification", intent=kept, message=say)
-    if meant.share < LIKELY:
+    if why := _in_one(heard, meant.intent):
+        return Reply(status="clarification", intent=meant.intent, message=why)
+    odd = len(gates.strange(heard.tokens, heard.models.words)[0])
+    doubt = meant.share < LIKELY + 0.1 * odd or gates.speaks_against(heard.line, meant.intent)
+    if doubt:
         return Reply(
             status="clarification",
             intent=meant.intent,
             message=f"Shall I {ABOUT[meant.intent]} or {ABOUT[meant.second]}? Say it in other words.",
         )
     filled = slots.fill(meant.intent, heard, meant.priority)
+    if meant.intent == "add_task" and "priority" not in filled.parameters:
+        _read_its_priority(heard, filled)
     return answer(heard, meant.intent, filled, sure=meant.share)
+
+
+def _asides(heard: Heard) -> Iterator[Meant]:
+    """What pieces mean that speak of *it* only, as ``then raise its priority``."""
+    for piece in _pieces(heard.tokens)[1:]:
+        words = {one.text for one in piece}
+        if words & {"it", "its", "him", "that"} and all(
+            one.kind in ("word", "mark") for one in piece
+        ):
+            meant = meaning(replace(heard, tokens=tuple(piece)))
+            if meant.share > 0.6:
+                yield meant
+
+
+def _in_one(heard: Heard, intent: str) -> str | None:
+    """Why an instruction that says two things of one is not clear."""
+    alike = {intent, "add_task", "change_task_priority" if intent == "add_task" else intent}
+    for meant in _asides(heard):
+        if meant.intent not in alike and (meant.share > 0.8 or intent == "add_task"):
+            return f"Shall I {ABOUT[intent]} or {ABOUT[meant.intent]}? One after the other, please."
+    return None
+
+
+def _read_its_priority(heard: Heard, filled: Filled) -> None:
+    for meant in _asides(heard):
+        if meant.intent == "change_task_priority":
+            if meant.priority is None:
+                filled.object_to("Which priority: low, normal or high?", "priority")
+            else:
+                filled.parameters["priority"] = meant.priority
 
 
 def answer(heard: Heard, intent: str, filled: Filled, sure: float = 1.0) -> Reply:
@@ -121,7 +156,7 @@ def answer(heard: Heard, intent: str, filled: Filled, sure: float = 1.0) -> Repl
     unclear = filled.trouble or gates.doubtful(heard.line, intent)
     if filled.trouble or (unclear and not asked):
         rest = [one for one in asked if not filled.trouble]
-        say = " ".join(filter(None, (unclear, slots.ask(heard, rest))))
+        say = " ".join(filter(None, (unclear, questions.ask(heard, rest))))
         return Reply(
             status="clarification", intent=intent, parameters=shown, missing=asked, message=say
         )
@@ -131,7 +166,7 @@ def answer(heard: Heard, intent: str, filled: Filled, sure: float = 1.0) -> Repl
             intent=intent,
             parameters=shown,
             missing=asked,
-            message=_so_far(heard, intent, filled) + slots.ask(heard, asked),
+            message=_so_far(heard, intent, filled) + questions.ask(heard, asked),
         )
     if left := leftover(heard, intent):
         return Reply(status="clarification", intent=intent, parameters=shown, message=left)
@@ -172,7 +207,9 @@ def _commands(intent: str, filled: Filled) -> tuple[Command, ...]:
     make = COMMANDS[intent].model_validate
     if not filled.several:
         return (make(filled.parameters),)
-    name = next(one for one in ("task_label", "robot", "obstacle") if one in COMMANDS[intent].model_fields)
+    name = next(
+        one for one in ("task_label", "robot", "obstacle") if one in COMMANDS[intent].model_fields
+    )
     return tuple(make({**filled.parameters, name: one}) for one in filled.several)
 
 
@@ -214,7 +251,13 @@ def _pieces(tokens: Sequence[Token]) -> list[list[Token]]:
     pieces: list[list[Token]] = [[]]
     for n, token in enumerate(tokens):
         ends = token.kind in ("mark", "word") and token.text in _BREAKS | _LINKS
-        if ends and token.text in _LINKS and pieces[-1] and len(pieces) < 12 and n + 1 < len(tokens):
+        if (
+            ends
+            and token.text in _LINKS
+            and pieces[-1]
+            and len(pieces) < 12
+            and n + 1 < len(tokens)
+        ):
             pieces.append([token])
         elif ends and token.text in _BREAKS and pieces[-1] and len(pieces) < 12:
             pieces[-1].append(token)
@@ -257,15 +300,11 @@ def _several(parts: Sequence[Heard]) -> Reply:
     for reply in replies:
         if reply.status != "complete":
             others = [ABOUT[one.intent] for one in replies if one is not reply and one.intent]
-            say = f"{reply.message} Then all at once: besides, {', '.join(others)}." if others else reply.message
+            say = (
+                f"{reply.message} Then all at once: besides, {', '.join(others)}."
+                if others
+                else reply.message
+            )
             return replace(reply, status="clarification", message=say)
     commands = tuple(command for reply in replies for command in reply.commands)
     return replace(replies[0], commands=commands, message="Shall I do all of this?")
-
-
-def label_of(heard: Heard, command: AddTask) -> str | None:
-    """The label that a task to add will have."""
-    try:
-        return command.filled(heard.live).task_label
-    except BadInput:
-        return None

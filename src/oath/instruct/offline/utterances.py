@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import re
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 
@@ -85,16 +85,17 @@ def vocabulary(rows: list[Line], macros: Mapping[str, str]) -> frozenset[str]:
 def utterances(seed: int = 0, each: int = 14) -> Iterator[Utterance]:
     """Draw up to `each` utterances of every line."""
     rows, macros = lines()
-    worlds = [_world(*names, vocabulary(rows, macros)) for names in _WORLDS]
+    words = vocabulary(rows, macros)
+    worlds = [_world(names, words) for names in _WORLDS]
     rng = random.Random(seed)
     for row in rows:
         seen = set()
         for _ in range(each):
             pattern = _drawn(row.pattern, macros, rng)
             world = rng.choice(worlds)
-            if (pattern,) in seen:
+            if pattern in seen:
                 continue
-            seen.add((pattern,))
+            seen.add(pattern)
             yield _filled(row, pattern, world, rng)
 
 
@@ -136,21 +137,10 @@ _WORLDS = (
 )
 
 
-def _world(
-    places: tuple[str, ...],
-    robots: tuple[str, ...],
-    labels: tuple[str, ...],
-    obstacles: tuple[str, ...],
-    types: tuple[str, ...],
-    words: Container[str],
-) -> Names:
-    def keyed(names: tuple[str, ...]) -> dict[str, str]:
-        return {key(name): name for name in names}
-
+def _world(names: Sequence[tuple[str, ...]], words: Container[str]) -> Names:
+    places, robots, labels, obstacles, types = ({key(one): one for one in some} for some in names)
     kinds = {kind: kind for kind in sorted(KINDS)}
-    return Names(
-        keyed(places), keyed(robots), keyed(labels), keyed(obstacles), kinds, keyed(types), words
-    )
+    return Names(places, robots, labels, obstacles, kinds, types, words)
 
 
 def _filled(row: Line, pattern: str, world: Names, rng: random.Random) -> Utterance:

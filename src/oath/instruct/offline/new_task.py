@@ -1,0 +1,294 @@
+"""The parameters of a task to add: where, where to, type, priority and label."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from oath.instruct.offline import questions
+from oath.instruct.offline.gates import is_vague
+from oath.instruct.offline.heard import Filled, Heard
+from oath.instruct.offline.tokens import Token
+
+_LOW = re.compile(
+    r"\b(low(est|er)?( |-)?priority|priority (is |of |to |at |: |= )*(low\w*|minimum)|(not"
+    r"|no longer|less|least|"
+    r"isn't) (so |that |very |really |too )?(urgent|important|pressing|critical)|no (rush|hurry|"
+    r"urgency|pressure)|low|can wait|at the end|lowest|whenever (you|there|it)|unimportant|"
+    r"take your time|last|when (you have|there is) (some |)time|not in a hurry)\b"
+)
+_HIGH = re.compile(
+    r"\b((?<!not )(?<!no longer )(?<!not so )(?<!not very )(?<!not that )(urgent(ly)?|asap"
+    r"|critical|pressing|express)|"
+    r"(high(est|er)?|top|maximum|first|max)( |-)?priority|priority (is |of |to |at |: "
+    r"|= )*(high\w*|urgent|top|1|one)|"
+    r"as soon as possible|immediately|right away|at once|emergency|rush|high|quickly|"
+    r"with priority|straight away|without delay|before (all|everything|anything)( else"
+    r"| others?)?)\b"
+)
+_NORMAL = re.compile(
+    r"\b(normal|regular|standard|default|medium|usual) (priority|urgency)\b|\bpriority (is |of "
+    r"|to |"
+    r"at |: |= )*(normal|standard|default|medium|regular)\b"
+)
+
+
+def said_priority(line: str) -> set[str]:
+    """The priorities that the words name.
+
+    Examples
+    --------
+    >>> said_priority("add a task , it is not urgent"), said_priority("priority high")
+    ({'low'}, {'high'})
+    """
+    found = set()
+    if _NORMAL.search(line):
+        found.add("normal")
+    if _LOW.search(line):
+        found.add("low")
+        line = _LOW.sub(" ", line)
+    if _HIGH.search(line):
+        found.add("high")
+    return found
+
+
+_TYPES_ELSEWHERE = frozenset(
+    [
+        "inspection",
+        "inspect",
+        "cleaning",
+        "clean",
+        "survey",
+        "patrol",
+        "scan",
+        "scanning",
+        "photo",
+        "maintenance",
+        "repair",
+        "fragile",
+        "heavy",
+        "surveillance",
+        "monitoring",
+        "sampling",
+        "measurement",
+        "mapping",
+        "welding",
+        "painting",
+        "refrigerated",
+        "cold",
+        "hazardous",
+        "disinfection",
+        "security",
+        "guarding",
+        "charging",
+        "assembly",
+    ]
+)
+
+_NEW_LABEL = re.compile(
+    r"^(?:call(?:ed)? (?:it|this|that|the task|the job|this one|the new one"
+    r"|the new task)(?: task| as)?"
+    r"|nam(?:e|ed)(?: it| this| the task| as)?|label(?:l?ed)?(?: it| is| of| as| the task"
+    r"| should be)?"
+    r"|called|with (?:the )?(?:label|name|id)|(?:its )?(?:id|label|name) (?:is|should be"
+    r"|shall be)|id|"
+    r"tag(?:ged)?(?: it)?(?: as)?|under the (?:name|label)|identifier|known as"
+    r"|labell?ed as)(?: :| =)?$"
+)
+_NO_LABEL = frozenset(
+    [
+        "a",
+        "an",
+        "the",
+        "it",
+        "this",
+        "that",
+        "as",
+        "to",
+        "at",
+        "for",
+        "with",
+        "and",
+        "or",
+        "of",
+        "in",
+        "new",
+        "task",
+        "job",
+        "high",
+        "low",
+        "normal",
+        "urgent",
+        "special",
+        "please",
+        "is",
+        "from",
+        "by",
+        "on",
+        "priority",
+        "label",
+        "name",
+        "id",
+        "called",
+        "me",
+        "us",
+        "you",
+    ]
+)
+
+
+def read_new_task(heard: Heard, filled: Filled) -> None:
+    """Read the parameters of a task to add."""
+    read_new_label(heard, filled)
+    read_type(heard, filled)
+    line = heard.line
+    said = said_priority(line)
+    if len(said) == 1:
+        filled.parameters["priority"] = said.pop()
+    elif said:
+        filled.object_to(f"Which priority: {' or '.join(sorted(said))}?")
+    robots = [one for one in heard.of("robot", "unknown_robot") if one.value != "all"]
+    if robots and not filled.trouble:
+        filled.object_to(
+            f"Which robot does a task is decided by the planner; I cannot give it to "
+            f"{robots[0].raw}. Say it without the robot."
+        )
+    _places(heard, filled)
+    for name in ("location", "delivery_point"):
+        if name not in filled.parameters and name not in filled.missing:
+            filled.missing.append(name)
+    if not filled.trouble and re.search(r"\b(two|three|four|several|some|many|few|both) (\w+ )?"
+                                        r"(tasks|jobs|orders|errands|deliveries)\b"
+                                        r"|<number> (\w+ )?(tasks|jobs)",
+                                        line):  # fmt: skip
+        filled.object_to(
+            "Several tasks at once: tell me one at a time, each with where and where to."
+        )
+
+
+def read_new_label(heard: Heard, filled: Filled) -> None:
+    """Read the label that a task to add is given."""
+    labels: list[str] = []
+    for n, token in enumerate(heard.tokens):
+        before = [
+            one.text for one in heard.tokens[max(n - 5, 0) : n] if one.kind in ("word", "mark")
+        ]
+        cued = any(_NEW_LABEL.match(" ".join(before[k:])) for k in range(len(before)))
+        if token.kind == "unknown_label" or (
+            cued
+            and token.kind in ("word", "label", "place", "robot", "type", "number")
+            and token.text not in _NO_LABEL
+            and re.fullmatch(r"\w[\w.-]{0,63}", token.raw)
+        ):
+            labels.append(token.raw)
+        elif token.kind == "label":
+            filled.object_to(
+                f"There is a task {token.value} already. Give the new one another label, or "
+                f"leave it out.",
+            )
+    if len(set(labels)) > 1:
+        filled.object_to(f"Which label: {' or '.join(labels)}?", "task_label")
+    elif labels:
+        filled.parameters["task_label"] = labels[0]
+        known = {one.casefold(): one for one in heard.live.state.labels}
+        if labels[0].casefold() in known:
+            filled.object_to(
+                f"The label {known[labels[0].casefold()]} is taken. Give another one.", "task_label"
+            )
+
+
+def read_type(heard: Heard, filled: Filled) -> None:
+    """Read a task's type."""
+    types = heard.of("type")
+    known = heard.live.scene.mission.task_types
+    if len(types) > 1:
+        filled.object_to(
+            f"Which type: {' or '.join(str(one.value) for one in types)}?", "task_type"
+        )
+    elif types:
+        filled.parameters["task_type"] = types[0].value
+        return
+    for n, token in enumerate(heard.tokens):
+        after = [one.text for one in heard.tokens[n + 1 : n + 3]]
+        if token.kind == "word" and token.text in _TYPES_ELSEWHERE:
+            same = [one for one in known if token.text[:5] == one.casefold()[:5]]
+            if len(same) == 1:
+                filled.parameters["task_type"] = same[0]
+            elif {"task", "job", "order", "assignment"} & set(after):
+                filled.object_to(
+                    f"There is no task type '{token.raw}'. Known: {', '.join(known)}.", "task_type"
+                )
+
+
+def _places(heard: Heard, filled: Filled) -> None:
+    """What of the places and points is the pickup and what the delivery."""
+    spots = []
+    for n, token in enumerate(heard.tokens):
+        if token.kind in ("point", "place", "unknown_place") and not _names_a_label(filled, token):
+            spots.append(n)
+    if len(spots) > 2:
+        different = {str(heard.tokens[n].value) for n in spots}
+        if len(different) > 2:
+            filled.object_to("Which is where it is picked up, and which where it goes?")
+            return
+    roles = assign_roles(heard, spots)
+    if roles is None:
+        filled.object_to(
+            "Which is where it is picked up, and which where it goes? For example: from (5, 19.5) "
+            "to (6, 3)"
+        )
+        return
+    for at, role in roles.items():
+        read_spot(heard, filled, "location" if role == "pickup" else "delivery_point", at)
+
+
+def _names_a_label(filled: Filled, token: Token) -> bool:
+    return token.kind == "place" and filled.parameters.get("task_label") == token.raw
+
+
+def read_spot(heard: Heard, filled: Filled, name: str, at: int) -> None:
+    """Give a task's location or delivery point the value of the place or point at an index."""
+    token, mission = heard.tokens[at], heard.live.scene.mission
+    ask = questions.ask_location if name == "location" else questions.ask_delivery
+    if token.kind == "unknown_place":
+        filled.object_to(questions.unknown_place(heard, token), name)
+    elif is_vague(heard.tokens, at):
+        filled.object_to(f"Where exactly? '{token.raw}' says only roughly. {ask(heard)}", name)
+    elif token.kind == "place" and name == "delivery_point":
+        filled.parameters[name] = token.value
+    else:
+        x, y = mission.places[token.value] if token.kind == "place" else token.value
+        if why := questions.outside(heard, (x, y)):
+            filled.object_to(why, name)
+        else:
+            filled.parameters[name] = [x, y]
+
+
+SURE = 0.65
+"""How likely a reading of the places must be to be proposed."""
+
+
+def assign_roles(heard: Heard, spots: Sequence[int]) -> dict[int, str] | None:
+    """The most likely roles of places and points, at most one of each; None if that is unsure."""
+    share = [heard.models.roles(heard.tokens, at) for at in spots]
+    if not spots:
+        return {}
+    if len(spots) == 1:
+        best = max(share[0], key=lambda role: share[0][role])
+        if best == "other" or share[0][best] < SURE:
+            best = "pickup" if heard.tokens[spots[0]].kind == "point" else best
+            rest = share[0]["pickup"] + share[0]["delivery"]
+            if best == "other":
+                best = "pickup" if share[0]["pickup"] > share[0]["delivery"] else "delivery"
+            if rest and share[0][best] / rest < SURE:
+                return None
+        return {spots[0]: best}
+    scores: dict[tuple[int, int], float] = {}
+    for a, first in enumerate(share):
+        for b, second in enumerate(share):
+            if a != b:
+                scores[a, b] = first["pickup"] * second["delivery"]
+    (a, b), best_score = max(scores.items(), key=lambda item: item[1])
+    if best_score / (best_score + scores.get((b, a), 0.0) + 1e-12) < SURE:
+        return None
+    return {spots[a]: "pickup", spots[b]: "delivery"}
