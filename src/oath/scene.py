@@ -214,12 +214,10 @@ class _Posed:
         if robot in state.paused:
             return rest
         next_stop = rest[:1] if rest[:1] == state.robots[robot].route[:1] else ()
-        if robot in self.under_way and self.under_way[robot].at_work:
-            first = next_stop + (self.first or {}).get(robot, ())
-        elif self.first is None:
-            return ()
-        else:
-            first = self.first.get(robot, ())
+        at_work = robot in self.under_way and self.under_way[robot].at_work
+        if self.first is None:
+            return next_stop if at_work else ()
+        first = (next_stop if at_work else ()) + self.first.get(robot, ())
         if not state.reconsiders:
             return first + tuple(stop for stop in rest if stop not in first)
         return first or next_stop
