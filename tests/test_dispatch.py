@@ -25,6 +25,7 @@ from oath.dispatch import (
     Repair,
     UpdateMap,
     advance,
+    failure,
 )
 from oath.errors import BadInput
 from oath.model import Mission, Route, RouteStop
@@ -97,7 +98,7 @@ def check_partition(state: State) -> None:
     for id, one in state.robots.items():
         for task in one.carrying:
             due = RouteStop(task=task, stop="delivery") in one.route
-            assert due == (task not in state.stranded), (id, task)
+            assert due == (task in state.deliverable(id)), (id, task)
         for stop in one.route:
             if stop.stop == "delivery":
                 to_pick_up = RouteStop(task=stop.task, stop="pickup") in one.route
@@ -353,16 +354,21 @@ class Chaos:
         """The state that the round in flight was asked for."""
         self.plans: list[tuple[str, Any]] = []
         self.driving: set[str] = set()
-        self.finds = 3
+        self.changes = 6
         self.finishes = 0
 
     def run(self) -> None:
         self.apply(started())
-        for _ in range(400):
-            event = self.next_event()
-            if event is None:
+        for _ in range(600):
+            if self.changes and self.rng.random() < 0.15:
+                self.changes -= 1
+                for event in self.change():
+                    self.apply(event)
+                continue
+            events = self.next_event()
+            if not events:
                 break
-            self.apply(event)
+            self.apply(events[0])
         else:
             pytest.fail("the mission does not end")
         # Nothing is in flight any more: dispatch must have said that this is the end.
@@ -384,27 +390,50 @@ class Chaos:
                     self.plans.append((robot, known))
                 case Drive(robot):
                     assert self.state.robots[robot].route, f"{robot} is sent nowhere"
+                    assert robot not in self.state.paused | self.state.failed
                     self.driving.add(robot)
                 case Finish():
                     self.finishes += 1
         assert self.state.allocating == (self.asked is not None)
 
-    def next_event(self) -> ev.AnyEvent | None:
+    def next_event(self) -> list[ev.AnyEvent]:
         choices: list[ev.AnyEvent] = [*self.stops(), *self.planning()]
         if self.asked is not None:
             choices.append(self.answer(self.asked))
-        if not choices:
-            return None
-        if self.finds and self.rng.random() < 0.1:
-            self.finds -= 1
-            finder = self.rng.choice(self.mission.robots).id
-            return ev.ObstacleFound(t=self.state.t, robot=finder, obstacle="x", polygon=DOOR)
+        if not choices:  # nobody does anything any more, unless those who are paused go on
+            return [ev.RobotResumed(t=self.state.t, robot=r) for r in sorted(self.state.paused)]
         event = self.rng.choice(choices)
         if isinstance(event, ev.Allocated):
             self.asked = None
         if isinstance(event, ev.Planned):
             self.plans.remove((event.robot, event.reason))
-        return event
+        return [event]
+
+    def change(self) -> Sequence[ev.AnyEvent]:
+        """Return something that changes the mission, or nothing if it is not possible."""
+        state, t, rng = self.state, self.state.t, self.rng
+        robots = [robot for robot in state.robots if robot not in state.failed]
+        undone = [task for task in state.tasks if task not in state.completed]
+        choices: list[Sequence[ev.AnyEvent]] = []
+        new = f"new{self.changes}"
+        choices.append([ev.TaskAdded(t=t, task=delivery(new, (1, 1), (2, 2)))])
+        choices.append([ev.ObstacleAdded(t=t, obstacle=new, kind="wall", polygon=DOOR)])
+        choices += [[ev.ObstacleRemoved(t=t, obstacle=one)] for one in state.obstacles]
+        if undone:
+            task, priority = rng.choice(undone), rng.choice(["low", "normal", "high"])
+            choices.append([ev.TaskCancelled(t=t, task=task)])
+            choices.append([ev.PriorityChanged(t=t, task=task, priority=priority)])
+        if robots:
+            robot = rng.choice(robots)
+            choices.append([ev.ObstacleFound(t=t, robot=robot, obstacle="x", polygon=DOOR)])
+            choices.append(failure(state, robot, state.robots[robot].position))
+            kind = ev.RobotResumed if robot in state.paused else ev.RobotPaused
+            choices += [[kind(t=t, robot=robot)]] * 2
+        events = rng.choice(choices)
+        for event in events:
+            if isinstance(event, ev.RobotPaused | ev.RobotFailed):
+                self.driving.discard(event.robot)
+        return [ev.Commanded(t=t, command={"intent": "some"}, source="test"), *events]
 
     def stops(self) -> list[ev.AnyEvent]:
         t = self.state.t + self.rng.random()
@@ -427,7 +456,7 @@ class Chaos:
         routes: dict[str, Route] = {id: one.route for id, one in then.robots.items()}
         open_ = list(then.waiting())
         for id in routes:
-            if routes[id] and self.rng.random() < 0.7:
+            if id in then.failed | then.paused or (routes[id] and self.rng.random() < 0.7):
                 continue
             can = [task for task in open_ if (id, task) not in then.refused]
             if can and self.rng.random() < 0.8:
@@ -435,7 +464,8 @@ class Chaos:
                 open_.remove(task.id)
                 routes[id] += tuple(RouteStop(task=task.id, stop=stop.name) for stop in task.stops)
         # Some tasks that nobody has picked up yet change hands.
-        for one, other in pairwise(self.mission.robots):
+        works = [one for one in self.mission.robots if one.id not in then.failed | then.paused]
+        for one, other in pairwise(works):
             mine = [s for s in routes[one.id] if s.task in then.open_tasks()]
             if mine and self.rng.random() < 0.2:
                 task_id = mine[0].task
@@ -448,7 +478,7 @@ class Chaos:
         )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(missions(), st.integers(0, 2**32 - 1))
 def test_no_task_is_lost_or_doubled_whatever_happens(mission: Mission, seed: int) -> None:
     Chaos(mission, seed).run()

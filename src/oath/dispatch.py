@@ -228,12 +228,13 @@ def _allocated(state: State, event: Allocated) -> tuple[State, tuple[Action, ...
 def _still_good(state: State, routes: Mapping[str, Route]) -> dict[str, Route]:
     """The routes of an answer less what happened while it was made.
 
-    Stops served meanwhile are left out. A route that no longer fits its robot is passed over, and
-    with it every route that takes a task which such a robot keeps; another round is due then.
+    Stops served or cancelled meanwhile are left out. A route that no longer fits its robot is
+    passed over, and with it every route that takes a task which such a robot keeps; another round
+    is due then.
     """
     good = {}
     for id, route in routes.items():
-        left = tuple(stop for stop in route if not _is_served(state, id, stop))
+        left = tuple(stop for stop in route if not _is_past(state, id, stop))
         if _fits(state, id, left):
             good[id] = left
     while True:
@@ -250,7 +251,9 @@ def _still_good(state: State, routes: Mapping[str, Route]) -> dict[str, Route]:
             del good[id]
 
 
-def _is_served(state: State, robot: str, stop: RouteStop) -> bool:
+def _is_past(state: State, robot: str, stop: RouteStop) -> bool:
+    if stop.task not in state.tasks:
+        return True  # it was cancelled
     is_first = stop.stop == state.tasks[stop.task].stops[0].name
     carried = stop.task in state.robots[robot].carrying
     return stop.task in state.completed or (carried and is_first)
@@ -261,6 +264,8 @@ def _fits(state: State, robot: str, route: Route) -> bool:
     carrying = set(state.deliverable(robot))
     tasks = {stop.task for stop in route}
     may_begin = set(state.open_tasks()) if robot not in state.failed else set()
+    if robot in state.paused:
+        may_begin &= {stop.task for stop in state.robots[robot].route}
     return carrying <= tasks and all(
         task in may_begin and (robot, task) not in state.refused for task in tasks - carrying
     )
@@ -371,7 +376,7 @@ def _task_cancelled(state: State, event: TaskCancelled) -> tuple[State, tuple[Ac
 
 def _robot_failed(state: State, event: RobotFailed) -> tuple[State, tuple[Action, ...]]:
     why = f"carried by {event.robot}, which failed"
-    lost = {id: why for id in state.robots[event.robot].carrying if id not in state.stranded}
+    lost = dict.fromkeys(state.deliverable(event.robot), why)
     state = replace(state, failed=state.failed | {event.robot}, stranded={**state.stranded, **lost})
     state = _with(state, event.robot, route=(), stale=False)
     state, more = _allocate(state)
