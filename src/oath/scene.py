@@ -112,10 +112,13 @@ def pose(
     first: dict[str, Route] = {}
     busy = {state.robots[id].route[0].task for id, way in under_way.items() if way.at_work}
     if under_way and (tasks := [id for id in state.urgent() if id not in busy]):
-        turning = _Posed(scene, state, under_way, tasks, None).problem()
+        free = {
+            RouteStop(task=id, stop=stop.name) for id in tasks for stop in state.tasks[id].stops
+        }
+        turning = _Posed(scene, state, under_way, free, None).problem()
         index = {task: p for p, task in enumerate(turning.tasks)}
         first = dict(urgent(turning, [index[task] for task in tasks]).routes)
-    given = {stop.task for route in first.values() for stop in route}
+    given = {stop for route in first.values() for stop in route}
     return _Posed(scene, state, under_way, given, first).problem()
 
 
@@ -128,7 +131,7 @@ class _Posed:
     Parameters
     ----------
     urgent
-        Tasks that are in no route but those of `first`.
+        Stops that are in no route but those of `first`.
     first
         What robots do before anything else; None = every robot that can turn is free to.
     """
@@ -138,7 +141,7 @@ class _Posed:
         scene: Scene,
         state: State,
         under_way: Mapping[str, UnderWay],
-        urgent: Collection[str],
+        urgent: Collection[RouteStop],
         first: Mapping[str, Route] | None,
     ) -> None:
         self.scene, self.state, self.under_way = scene, state, under_way
@@ -206,7 +209,7 @@ class _Posed:
     def _rest(self, robot: str) -> Route:
         """A robot's route less what is urgent."""
         route = self.state.robots[robot].route
-        return tuple(stop for stop in route if stop.task not in self.urgent)
+        return tuple(stop for stop in route if stop not in self.urgent)
 
     def _fixed(self, robot: str) -> Route:
         """What a robot does in any case: its route, or its next stop if routes may change."""

@@ -17,12 +17,12 @@ from pydantic_ai.models.test import TestModel
 
 from missions import box, bush, delivery, robot, visit, yard
 from oath.commands import COMMANDS, Live, parse, to_plain
-from oath.dispatch import State
 from oath.instruct import Dialogue, Draft, Reply
 from oath.instruct.model import ModelInterpreter
 from oath.instruct.model.prompt import LONGEST, REFUSALS, answer_schema, message, rules
 from oath.model import Mission
 from oath.scene import prepare
+from oath.state import State
 from oath.world.roadmap import Params
 
 MISSION: Mission = replace(

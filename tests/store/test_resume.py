@@ -20,13 +20,13 @@ from missions import CELL_DOOR, cell, delivery, gate, random_mission, robot, vis
 from oath.allocate import Budget
 from oath.allocate import allocator as named
 from oath.commands import Command, parse
-from oath.dispatch import State
 from oath.errors import BadInput
 from oath.events import AnyEvent, Commanded, MissionFinished, StopServed
 from oath.fleet.sim import SimFleet
 from oath.model import Mission
 from oath.runtime import Result, Runtime
 from oath.scene import prepare, require_reachable
+from oath.state import State
 from oath.store import replayed
 from oath.store.sqlite import SqliteJournal, read
 from oath.verify import verify

@@ -15,7 +15,18 @@ from hypothesis import strategies as st
 
 from oath import events as ev
 from oath.errors import BadInput
-from oath.model import Map, Mission, Motion, Obstacle, OccupancyGrid, Point, Robot, Stop, Task
+from oath.model import (
+    Map,
+    Mission,
+    Motion,
+    Obstacle,
+    OccupancyGrid,
+    Point,
+    Robot,
+    RouteStop,
+    Stop,
+    Task,
+)
 from oath.verify import Verdict, verify
 
 Log = list[ev.AnyEvent]
@@ -177,6 +188,19 @@ def grown(id: str, x: float, y: float, size: float, t: float, kind: str = "box")
     return ev.ObstacleAdded(t=t, obstacle=id, kind=kind, polygon=polygon)
 
 
+def asked(intent: str, **parameters: Any) -> ev.Commanded:
+    command = {"intent": intent, "parameters": parameters}
+    return ev.Commanded(t=0.0, command=command, source="test")
+
+
+def answered(*stops: str) -> ev.Allocated:
+    """Return a round that gives g a route: ``+a`` picks a up, ``-a`` delivers it."""
+    names: dict[str, Any] = {"+": "pickup", "-": "delivery"}
+    route = tuple(RouteStop(task=stop[1:], stop=names[stop[0]]) for stop in stops)
+    return ev.Allocated(t=0.0, round=1, seconds=0.0, routes={"g": route, "d": ()}, unassigned={})
+
+
+HIGH = ev.PriorityChanged(t=0.0, task="t3", priority="high")
 HERE = delivery("t4", (3, 3), (3, 3))
 SLOW = delivery("t4", (3, 3), (3, 3), time=2.0)
 
@@ -276,6 +300,32 @@ BROKEN: list[tuple[str, str, Callable[[Log], Log]]] = [
             *log[7:],
         ],
     ),
+    (
+        "halted",
+        "serves while paused",
+        append(
+            ev.RobotPaused(t=13.0, robot="g"),
+            added(visit("t4", (3, 3)), 13.0),
+            served("g", "t4", "visit", (3, 3), 13.5),
+            ev.RobotResumed(t=14.0, robot="g"),
+        ),
+    ),
+    ("command", "without effect", insert(1, asked("cancel_task", task_label="t1"))),
+    (
+        "command",
+        "with another effect",
+        insert(1, asked("change_task_priority", task_label="t1"), HIGH),
+    ),
+    (
+        "command",
+        "with another wall",
+        insert(
+            1,
+            asked("obstacle_update", obstacle_location=[[8, 9], [9, 9]]),
+            grown("box", 8, 9, 0.5, 0.0),
+        ),
+    ),
+    ("priority", "urgent work waits", insert(1, HIGH, answered("+t1", "-t1", "+t3", "-t3"))),
     ("halted", "moves after it failed", insert(2, ev.RobotFailed(t=2.0, robot="d"))),
     (
         "halted",
@@ -423,6 +473,9 @@ def test_a_cancelled_task_need_not_be_served_and_may_come_back() -> None:
         append(moved("d", (9, 5), (9, 8), 13, 16)),
         append(ev.RobotPaused(t=13.0, robot="g"), ev.RobotResumed(t=14.0, robot="g")),
         append(ev.RobotFailed(t=13.0, robot="g")),
+        insert(1, asked("change_task_priority", task_label="t3", priority="high"), HIGH),
+        insert(1, HIGH, answered("+t3", "+t1", "-t1", "-t3")),
+        insert(1, HIGH, answered("-t1", "+t3", "-t3")),
     ],
     ids=[
         "touches the wall's clearance",
@@ -437,6 +490,9 @@ def test_a_cancelled_task_need_not_be_served_and_may_come_back() -> None:
         "touches a forbidden zone's border",
         "pauses between moves",
         "fails after its work",
+        "does what it is asked to",
+        "begins with what is urgent",
+        "delivers before what is urgent",
     ],
 )
 def test_what_is_allowed(mutate: Callable[[Log], Log]) -> None:

@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
-from oath.dispatch import State, advance
+from oath.dispatch import advance
 from oath.events import (
     AnyEvent,
     Moved,
@@ -18,6 +18,7 @@ from oath.events import (
     TaskAdded,
 )
 from oath.model import Mission
+from oath.state import State
 
 EVERY = 500
 """A checkpoint is kept after so many events."""

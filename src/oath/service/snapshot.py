@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from oath.commands import Live, Undo
-from oath.dispatch import State
 from oath.errors import BadInput
 from oath.fleet import Pose
 from oath.model import Mission, OccupancyGrid, Point, Task
 from oath.scene import Scene
 from oath.service.history import Tally
+from oath.state import State
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,12 +14,13 @@ from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
 from oath.allocate import allocator as named
-from oath.dispatch import State, advance
+from oath.dispatch import advance
 from oath.errors import BadInput
 from oath.events import AnyEvent
 from oath.formats import mission as mission_file
 from oath.formats.yaml_document import read_bytes
 from oath.model import Mission
+from oath.state import State
 
 
 class Journal(Protocol):

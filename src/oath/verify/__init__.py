@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from oath.events import AnyEvent, ObstacleFound, StopServed
 from oath.model import Mission
+from oath.verify.commands import judge_commands
 from oath.verify.motion import Separation, judge_motion, separation
 from oath.verify.record import TOLERANCE, Record, RuleName, Violation, read
 from oath.verify.rules import judge_rules
@@ -80,6 +81,7 @@ def verify(mission: Mission, events: Sequence[AnyEvent]) -> Verdict:
     violations += judge_service(record)
     violations += judge_motion(record)
     violations += judge_rules(record)
+    violations += judge_commands(record)
     # Those that no event is to blame for come last; the sort is stable.
     violations.sort(key=lambda v: len(events) if v.seq is None else v.seq)
     return Verdict(

@@ -47,6 +47,8 @@ RuleName = Literal[
     "one_robot",
     "capability",
     "cancelled",
+    "priority",
+    "command",
     "position",
     "service_time",
     "service_overlap",

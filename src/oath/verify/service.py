@@ -104,9 +104,10 @@ def _robot_faults(job: _Job, event: StopServed, track: Track) -> Iterator[Fault]
     if first and not robot.can.get(kind, 0.0) > 0:
         can = ", ".join(sorted(robot.can)) or "nothing"
         yield "capability", f"task '{event.task}' is of type '{kind}'; the robot can do {can}"
-    for since, _, why in track.halts:
-        if why == "failed" and event.t > since + TOLERANCE:
-            yield "halted", f"it serves task '{event.task}' after it failed at {since:.6g} s"
+    for since, until, why in track.halts:
+        if since + TOLERANCE < event.t < until - TOLERANCE:
+            text = f"it serves task '{event.task}' though it is {why} since {since:.6g} s"
+            yield "halted", text
 
 
 def _place_faults(job: _Job, event: StopServed, track: Track) -> Iterator[Fault]:
