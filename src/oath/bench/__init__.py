@@ -37,6 +37,8 @@ STUDIES: dict[str, Callable[[], Study]] = {
         "scaling",
         "automaton",
         "churn",
+        "instructions",
+        "latency",
     )
 }
 """Every study by its name, in the order of the report."""
