@@ -23,6 +23,7 @@ from oath.cli.options import (
     seed_option,
     weight_option,
 )
+from oath.cli.replay import record, replay
 from oath.cli.serve import serve
 from oath.cli.talk import acts, chat, interpret
 from oath.errors import OathError
@@ -93,6 +94,13 @@ def main() -> None:
     type=click.Path(path_type=Path),
     help="Timed instructions and commands to play into the mission (YAML).",
 )
+@click.option(
+    "--record",
+    "recorded",
+    metavar="FILE.mcap",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Recording of the mission for Foxglove, Rerun and others.",
+)
 @json_option
 def run(
     mission: Path,
@@ -103,6 +111,7 @@ def run(
     points: int,
     out: Path | None,
     script: Path | None,
+    recorded: Path | None,
     as_json: bool,
 ) -> None:
     """Run a mission in the built-in simulator, to its last delivery."""
@@ -142,6 +151,10 @@ def run(
             nodes=roadmap.nodes(),
             edges=roadmap.edges(),
         )
+    if recorded is not None:
+        from oath.picture.recording import write_recording
+
+        write_recording(recorded, loaded, result.events)
     if as_json:
         print_json(result.summary)
     else:
@@ -344,6 +357,8 @@ def verify(mission: Path, events: Path, as_json: bool) -> None:
 main.add_command(interpret)
 main.add_command(chat)
 main.add_command(serve)
+main.add_command(replay)
+main.add_command(record)
 
 
 @main.command(
