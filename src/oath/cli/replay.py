@@ -13,7 +13,7 @@ from oath.errors import BadInput
 from oath.terminal import print_json, write
 
 if TYPE_CHECKING:
-    from oath.dispatch import State
+    from oath.state import State
 
 journal_argument = click.argument(
     "journal", metavar="JOURNAL", type=click.Path(dir_okay=False, path_type=Path)

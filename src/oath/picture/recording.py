@@ -29,13 +29,14 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from oath.dispatch import State, advance
+from oath.dispatch import advance
 from oath.errors import BadInput, StoreError
 from oath.events import AnyEvent, Moved
 from oath.formats.event_log import TYPES, to_line
 from oath.model import Mission, Point
 from oath.picture import ROBOT_COLOURS, shapes
 from oath.picture.statuses import robot_statuses, task_statuses
+from oath.state import State
 
 if TYPE_CHECKING:
     from foxglove import messages as fox

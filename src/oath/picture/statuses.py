@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from oath.dispatch import State
+from oath.state import State
 
 TaskStatus = Literal["waiting", "assigned", "carried", "done", "stranded"]
 RobotStatus = Literal["working", "idle", "paused", "failed"]
