@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,6 +41,7 @@ from oath.terminal import (
 if TYPE_CHECKING:
     from oath.events import AnyEvent
     from oath.model import Mission
+    from oath.picture.recording import Recorder
     from oath.scene import Assigned
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
@@ -138,7 +140,10 @@ def run(
             points=points,
             on_event=on_event,
         )
-        result = runtime.run(acts(runtime, entries))
+        with _recorder(recorded, loaded) as recorder:
+            result = runtime.run(acts(runtime, entries))
+            if recorder is not None:
+                recorder.play(result.events)
     if out is not None:
         from oath.picture import draw_run
 
@@ -151,16 +156,20 @@ def run(
             nodes=roadmap.nodes(),
             edges=roadmap.edges(),
         )
-    if recorded is not None:
-        from oath.picture.recording import write_recording
-
-        write_recording(recorded, loaded, result.events)
     if as_json:
         print_json(result.summary)
     else:
         print_summary(result.summary, out)
     if result.summary["unserved"]:
         raise click.exceptions.Exit(1)
+
+
+def _recorder(path: Path | None, mission: Mission) -> AbstractContextManager[Recorder | None]:
+    if path is None:
+        return nullcontext()
+    from oath.picture.recording import Recorder
+
+    return Recorder(path, mission)
 
 
 @main.command(

@@ -134,11 +134,12 @@ def _print(report: dict[str, Any]) -> None:
 @click.argument("file", metavar="FILE.mcap", type=click.Path(dir_okay=False, path_type=Path))
 def record(journal: Path, file: Path) -> None:
     """Make a recording of a journal that Foxglove, Rerun and other MCAP readers play."""
-    from oath.picture.recording import write_recording
+    from oath.picture.recording import Recorder
     from oath.store.sqlite import read
 
     stored = read(journal)
     mission = stored.origin.mission()
-    write_recording(file, mission, stored.events)
+    with Recorder(file, mission) as recorder:
+        recorder.play(stored.events)
     last = stored.events[-1].t if stored.events else 0.0
     click.echo(f"{mission.name}: {len(stored.events)} events, {last:.1f} s, see {file}")

@@ -66,7 +66,7 @@ _PROGRESS_SCHEMA = {
 
 
 class Recorder:
-    """Writes a recording while a mission runs: tell it events and poses in the order of time.
+    """Writes a recording: tell it events and poses in the order of time, or `play` it a log.
 
     Parameters
     ----------
@@ -161,6 +161,16 @@ class Recorder:
                 log_time=self._now,
             )
 
+    def play(self, events: Sequence[AnyEvent]) -> None:
+        """Record a whole event log, which may be cut off, with poses at `RATE`."""
+        told = (((event.t, 0), event) for event in events)
+        seen = (((t, 1), poses) for t, poses in _samples(self._mission, events))
+        for (t, _), one in merge(told, seen, key=lambda pair: pair[0]):
+            if isinstance(one, dict):
+                self.poses(t, one)
+            else:
+                self.event(one)
+
     def close(self) -> None:
         """Finish the file; without it readers must repair it first."""
         self._writer.close()
@@ -250,35 +260,6 @@ class Recorder:
         """Where a robot was last seen, and the stops ahead of it."""
         robot, tasks = self._state.robots[id], self._state.tasks
         return [robot.position, *(tasks[one.task].stop(one.stop).at for one in robot.route)]
-
-
-def write_recording(path: str | Path, mission: Mission, events: Sequence[AnyEvent]) -> None:
-    """Write the recording of a mission from its events.
-
-    Parameters
-    ----------
-    path
-        The file; it must not exist.
-    mission
-        The mission as it was when it started.
-    events
-        Its event log, which may be empty or cut off.
-
-    Raises
-    ------
-    BadInput
-        If the file exists, or foxglove-sdk is not installed.
-    StoreError
-        If it cannot be written.
-    """
-    told = (((event.t, 0), event) for event in events)
-    seen = (((t, 1), poses) for t, poses in _samples(mission, events))
-    with Recorder(path, mission) as recorder:
-        for (t, _), one in merge(told, seen, key=lambda pair: pair[0]):
-            if isinstance(one, dict):
-                recorder.poses(t, one)
-            else:
-                recorder.event(one)
 
 
 def _samples(
