@@ -86,6 +86,8 @@ def advance(state: State, event: AnyEvent) -> tuple[State, tuple[Action, ...]]:
     Laws: `state` is not changed; equal arguments give equal results; no task is ever lost
     (completed, carried, stranded, routed and waiting partition the tasks).
     """
+    if isinstance(event, Moved):  # most events are: they cost one copy of the state, not three
+        return _moved(state, event), ()
     state = _record(replace(state, t=max(state.t, event.t)), event)
     match event:
         case MissionStarted():
@@ -94,9 +96,6 @@ def advance(state: State, event: AnyEvent) -> tuple[State, tuple[Action, ...]]:
             return _allocated(state, event)
         case Planned():
             return _planned(state, event)
-        case Moved():
-            left = state.robots[event.robot].left - math.dist(event.from_, event.to)
-            return _with(state, event.robot, position=event.to, left=max(left, 0.0)), ()
         case StopServed():
             return _stop_served(state, event)
         case ObstacleFound():
@@ -194,6 +193,13 @@ def _opposite(state: State, event: AnyEvent) -> AnyEvent | None:
         case RobotResumed(robot=robot):
             return RobotPaused(t=t, robot=robot)
     return None
+
+
+def _moved(state: State, event: Moved) -> State:
+    robot = state.robots[event.robot]
+    left = max(robot.left - math.dist(event.from_, event.to), 0.0)
+    robots = {**state.robots, event.robot: replace(robot, position=event.to, left=left)}
+    return replace(state, t=max(state.t, event.t), robots=robots, recording=False)
 
 
 def _with(state: State, robot: str, **changes: object) -> State:

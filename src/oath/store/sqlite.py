@@ -150,8 +150,8 @@ class SqliteJournal:
     def replay(self, since: int = 0) -> list[AnyEvent]:
         """Return the events from a sequence number on."""
         with self._lock, self._asking():
-            rows = self._db.execute(_ROWS, (since, _END)).fetchall()
-        return list(_events(rows, self.path, self._upcasters))
+            rows = self._db.execute(_ROWS, (since, _END))
+            return list(_events(rows, self.path, self._upcasters))
 
     def known(self, id: str) -> Answer | None:
         """Return what was answered to the command with this id; None if there was none."""
