@@ -116,6 +116,28 @@ def test_others_read_what_is_owned(path: Path) -> None:
     assert read(path).events == some(54)
 
 
+def test_a_reader_does_not_hold_up_the_owner(path: Path) -> None:
+    journal = SqliteJournal(path)
+    with closing(sqlite3.connect(path)) as reader:
+        reader.execute("BEGIN")
+        assert reader.execute("SELECT count(*) FROM events").fetchone() == (50,)
+        journal.append(some(2, 50))
+        journal.close()  # as it is, not as one plain file
+        assert reader.execute("SELECT count(*) FROM events").fetchone() == (50,)
+    with closing(SqliteJournal(path)) as again:
+        assert again.replay() == some(52)
+    assert list(snapshot(path)) == [path.name]
+
+
+def test_an_interrupted_append_stores_nothing(path: Path) -> None:
+    with closing(SqliteJournal(path)) as journal:
+        with pytest.raises(KeyboardInterrupt), journal._transaction(range(50, 51)) as db:
+            db.execute("DELETE FROM events")
+            raise KeyboardInterrupt
+        assert journal.append(some(1, 50)) == range(50, 51)
+    assert read(path).events == some(51)
+
+
 def test_create_never_overwrites(path: Path) -> None:
     before = snapshot(path)
     with pytest.raises(BadInput, match="exists already"):
@@ -440,6 +462,11 @@ def test_maps_in_other_folders_come_along(tmp_path: Path) -> None:
 def test_a_journal_writes_nothing_outside(name: str) -> None:
     with pytest.raises(BadInput, match="outside of its folder"):
         Origin(files={name: b"x"}, allocator="lns").mission()
+
+
+def test_a_mission_that_this_version_does_not_read() -> None:
+    with pytest.raises(BadInput, match=r"^later.yaml: schema: unknown schema 'oath/mission/9'"):
+        Origin(files={"later.yaml": b"schema: oath/mission/9\n"}, allocator="lns").mission()
 
 
 def test_the_origin_of_a_missing_mission(tmp_path: Path) -> None:

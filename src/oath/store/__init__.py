@@ -127,7 +127,13 @@ class Origin:
                 path = Path(folder, name)
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_bytes(data)
-            return replace(mission_file.load(Path(folder, self.name)), source=self.name)
+            try:
+                mission = mission_file.load(Path(folder, self.name))
+            except BadInput as error:
+                raise BadInput(
+                    error.problem, file=self.name, field=error.field, remedy=error.remedy
+                ) from None
+            return replace(mission, source=self.name)
 
     def state(self, mission: Mission) -> State:
         """Return the state before anything happened."""

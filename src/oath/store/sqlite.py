@@ -139,9 +139,11 @@ class SqliteJournal:
             self._db.execute("BEGIN IMMEDIATE")
             yield self._db
             self._db.execute("COMMIT")
-        except sqlite3.Error as error:
+        except BaseException as error:
             with suppress(sqlite3.Error):  # SQLite has rolled back already after some errors
                 self._db.execute("ROLLBACK")
+            if not isinstance(error, sqlite3.Error):
+                raise
             raise StoreError(
                 f"{self.path}: event {seqs.start} cannot be stored ({error}), so it has not "
                 "happened; make room or repair the disk, then resume the mission"
@@ -179,6 +181,7 @@ class SqliteJournal:
         """Let go of the journal."""
         with self._lock:
             with suppress(sqlite3.Error):  # somebody reads it: then it is left as after a crash
+                self._db.execute("PRAGMA busy_timeout = 0")
                 self._db.execute("PRAGMA journal_mode = DELETE")
             self._db.close()
             self._owned.close()
@@ -310,7 +313,9 @@ def _writing(path: Path) -> sqlite3.Connection:
         raise BadInput(
             f"cannot be written ({error})",
             file=str(path),
-            remedy="check its rights; keep it on a local disk",
+            remedy="try again when nobody reads it"
+            if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_BUSY
+            else "check its rights; keep it on a local disk",
         ) from None
     return db
 
