@@ -32,6 +32,7 @@ from missions import (
 )
 from oath.allocate import Budget
 from oath.allocate import allocator as named
+from oath.commands import parse
 from oath.errors import BadInput
 from oath.events import (
     Allocated,
@@ -726,3 +727,17 @@ def test_when_every_robot_fails_the_mission_ends() -> None:
     mission = yard([robot("r1", (1, 1))], [visit("a", (9, 9)), visit("b", (9, 1))])
     result = run_with(mission, "lns", RobotFailed(t=0.5, robot="r1"))
     assert set(result.summary["unserved"]) == {"a", "b"}
+
+
+@pytest.mark.parametrize("allocator", ["lns", "oath"])
+def test_a_robot_at_work_unloads_just_that_for_what_is_urgent(allocator: str) -> None:
+    tasks = [delivery("a", HERE, (9, 5), service_time=2.0), delivery("b", (1, 5), (1, 9))]
+    mission = yard([robot("r", HERE)], tasks)
+    runtime = oath.prepare(mission, points=200, allocator=allocator)
+    wanted = {"task_label": "b", "priority": "high"}
+    urgent = parse({"intent": "change_task_priority", "parameters": wanted})
+    result = runtime.run([(1.0, lambda: runtime.command([urgent], "test"))])
+    assert verify(mission, result.events).ok
+    stops = of(StopServed, result)
+    assert [stop.task for stop in stops] == ["a", "a", "b", "b"]
+    assert stops[0].t == 2.0
