@@ -14,10 +14,12 @@ from oath.model import Point
 from oath.scene import Scene
 from oath.state import State
 
-Name = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=64)]
+Name = Annotated[
+    str, StringConstraints(strip_whitespace=True, min_length=1, max_length=64, pattern=r"\S")
+]
 """The name of something: a task's label, a place, a robot, an obstacle."""
 
-Coordinate = Annotated[float, Field(allow_inf_nan=False, strict=False, ge=-1e6, le=1e6)]
+Coordinate = Annotated[float, Field(allow_inf_nan=False, strict=True, ge=-1e6, le=1e6)]
 
 XY = Annotated[tuple[Coordinate, Coordinate], Field(description="[x, y] in metres")]
 

@@ -251,7 +251,7 @@ def _asking(owner: Owner, talks: Talks, metrics: Metrics) -> APIRouter:
     @router.post("/api/proposals", **_with(_shape(shapes.Replied), CONFLICT))
     async def propose(asked: shapes.Commands, window: Window = "") -> Response:
         """Have commands read back, as if they had been said in words."""
-        commands = [parse(command) for command in asked.commands]
+        commands = [parse(dict(command)) for command in asked.commands]
         reply = await _possible(owner.ask(lambda: talks.propose(window, commands)))
         return _raw(to_json({"reply": reply}))
 
@@ -271,7 +271,7 @@ def _asking(owner: Owner, talks: Talks, metrics: Metrics) -> APIRouter:
     @router.post("/api/commands", **_with(_shape(shapes.Commanded), CONFLICT))
     async def command(asked: shapes.IdentifiedCommands) -> Response:
         """Carry out commands of another system at once; the answer comes once they are durable."""
-        commands = [parse(one) for one in asked.commands]
+        commands = [parse(dict(one)) for one in asked.commands]
         work = owner.ask(
             lambda: owner.command(commands, source="api", id=asked.id), once_durable=True
         )

@@ -13,7 +13,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
-from oath.commands import Command
+from oath.commands import Command, to_plain
 from oath.errors import BadInput, OathError
 from oath.events import AnyEvent, Commanded, RobotFailed
 from oath.runtime import Runtime
@@ -127,6 +127,7 @@ class Owner(threading.Thread):
         self._journal: Journal
         self._last = -1
         self._id: str | None = None
+        self._commands: list[dict[str, Any]] = []
         self._asked: _Request | None = None
         self._lost: dict[str, float] = {}
         self._broken = False
@@ -224,11 +225,18 @@ class Owner(threading.Thread):
         BadInput
             If one of them is not possible; then nothing has changed.
         """
+        asked = [to_plain(command) for command in commands]
         if id is not None and (known := self._journal.known(id)) is not None:
+            if known.value != asked:
+                raise BadInput(
+                    f"the id {id!r} was used for other commands",
+                    field="id",
+                    remedy="make a new id for what is new",
+                )
             return known.events.stop - 1, True
         if self._runtime.state.finished:
             raise BadInput("the mission is over", remedy="start another")
-        self._id = id
+        self._id, self._commands = id, asked
         try:
             self._runtime.command(commands, source)
         finally:
@@ -355,7 +363,8 @@ class Owner(threading.Thread):
             return
         asked = any(isinstance(event, Commanded) for event in events)
         self._broken = True
-        last = self._journal.append(events, id=self._id if asked else None).stop - 1
+        id = self._id if asked else None
+        last = self._journal.append(events, id=id, answer=self._commands).stop - 1
         self._broken = False
         self._lost |= {event.robot: event.t for event in events if isinstance(event, RobotFailed)}
         self._listener.happened(events, time.monotonic())

@@ -12,20 +12,28 @@ from oath.service.clock import FASTEST, SLOWEST
 XY = Annotated[list[float], Field(min_length=2, max_length=2, description="[x, y] in metres")]
 
 
-def _one_command() -> dict[str, Any]:
-    shape = command_schema()
-    shape.pop("$schema")
-    return shape
-
-
-Command = Annotated[Any, WithJsonSchema(_one_command())]
-"""A typed command; `oath.commands.parse` reads it."""
-
 
 class Given(BaseModel):
     """Something that is sent to the server; unknown keys are refused."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class AnyCommand(Given):
+    """A typed command as far as all of them are alike."""
+
+    intent: str
+    parameters: dict[str, Any]
+
+
+def _every_command() -> dict[str, Any]:
+    shape = command_schema()
+    shape.pop("$schema")
+    return shape
+
+
+Command = Annotated[AnyCommand, WithJsonSchema(_every_command())]
+"""A typed command; `oath.commands.parse` reads it."""
 
 
 class Instruction(Given):
@@ -49,7 +57,7 @@ class IdentifiedCommands(Commands):
 class ClockChange(Given):
     """How the mission clock should go; what is left out stays."""
 
-    speed: Annotated[float, Field(ge=SLOWEST, le=FASTEST, strict=False)] | None = None
+    speed: Annotated[float, Field(ge=SLOWEST, le=FASTEST)] | None = None
     paused: bool | None = None
     step: bool | None = Field(None, description="go to the next event and hold there")
 
