@@ -37,15 +37,20 @@ def test_without_a_viewers_token_nobody_is_a_viewer() -> None:
     assert alone.role("") is None
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1:8080", "localhost:8080", "LOCALHOST:8080", "[::1]:8080"])
+@pytest.mark.parametrize(
+    "host", ["127.0.0.1:8080", "localhost:8080", "LOCALHOST:8080", "[::1]:8080"]
+)
 def test_own_hosts(host: str) -> None:
     assert HERE.is_own(host)
 
 
 @pytest.mark.parametrize(
     "host",
-    ["evil.example:8080", "127.0.0.1", "127.0.0.1:80", "127.0.0.1:8080:8080", "", None, "a b:8080"]
-    + ["localhost.evil.example:8080", "user@localhost:8080", "[::1:8080", "192.168.0.1:8080"],
+    [
+        *("evil.example:8080", "127.0.0.1", "127.0.0.1:80", "127.0.0.1:8080:8080", "", None),
+        *("a b:8080", "localhost.evil.example:8080", "user@localhost:8080", "[::1:8080"),
+        "192.168.0.1:8080",
+    ],
 )
 def test_foreign_hosts(host: str | None) -> None:
     assert not HERE.is_own(host)

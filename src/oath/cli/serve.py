@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
 
 import click
-
-if TYPE_CHECKING:
-    from oath.commands import Live
-    from oath.instruct import Dialogue, Interpreter, Reply
 
 from oath.cli.options import (
     allocator_option,
@@ -21,6 +18,14 @@ from oath.cli.options import (
     weight_option,
 )
 
+if TYPE_CHECKING:
+    from oath.commands import Live
+    from oath.instruct import Dialogue, Interpreter, Reply
+    from oath.model import Mission
+    from oath.service.server import Running
+    from oath.store import Origin
+    from oath.store.sqlite import SqliteJournal
+
 
 @click.command(
     epilog=examples(
@@ -30,6 +35,11 @@ from oath.cli.options import (
     )
 )
 @mission_argument
+@click.option(
+    "--journal",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="File that keeps the mission; if there is one, its mission goes on.",
+)
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at.")
 @click.option(
     "--port",
@@ -62,6 +72,7 @@ from oath.cli.options import (
 @points_option(1000)
 def serve(
     mission: Path,
+    journal: Path | None,
     host: str,
     port: int,
     token: str | None,
@@ -77,43 +88,98 @@ def serve(
 ) -> None:
     """Run a mission live, with a console in the browser and an API for other systems.
 
-    Prints the console's address once; its token lets operators in. Ctrl-C ends the server, not the
-    mission: with --journal it goes on where it was when the server starts again.
+    Prints the console's address once; the token in it lets operators in. Ctrl-C ends the server,
+    not the mission: with --journal it goes on where it was when the server starts again, with the
+    mission and the settings that it began with.
     """
+    from contextlib import closing
+
+    from oath.service.auth import access
+    from oath.service.server import listen
+    from oath.service.server import serve as run
+
+    settings = {
+        "allocator": allocator,
+        "makespan_weight": makespan_weight,
+        "seconds": budget,
+        "seed": seed,
+        "points": points,
+    }
+    with listen(host, port) as listener, TemporaryDirectory() as folder:
+        port = listener.getsockname()[1]
+        who, made_up = access(host=host, port=port, token=token, viewer=viewer_token)
+        if journal is None:
+            click.echo("note: without --journal, the mission ends with the server", err=True)
+        path = journal or Path(folder, "mission.journal")
+        running, kept = (_resumed if path.exists() else _begun)(mission, path, settings)
+        name = f"[{host}]" if ":" in host else host
+        link = f"?token={who.operator}" if made_up else ""
+        with closing(kept):
+            run(
+                running,
+                kept,
+                listener,
+                who,
+                speed=speed,
+                until_done=until_done,
+                rate=rate,
+                on_ready=lambda: click.echo(f"console: http://{name}:{port}/{link}"),
+            )
+
+
+def _begun(mission: Path, path: Path, settings: dict[str, Any]) -> tuple[Running, SqliteJournal]:
+    """Make a mission ready and begin its journal; bad input leaves none behind."""
     import oath
+    from oath.store import Origin
+    from oath.store.sqlite import SqliteJournal
+
+    origin = Origin.of(mission, **settings)
+    running = _running(oath.load(mission), origin)
+    return running, SqliteJournal.create(path, origin)
+
+
+def _resumed(mission: Path, path: Path, settings: dict[str, Any]) -> tuple[Running, SqliteJournal]:
+    """Open a journal and make its mission ready as it was."""
+    from oath.errors import BadInput
+    from oath.store import Origin
+    from oath.store.sqlite import SqliteJournal
+
+    journal = SqliteJournal(path)
+    try:
+        kept, given = journal.origin.mission(), Origin.of(mission, **settings)
+        if given.mission().name != kept.name:
+            raise BadInput(
+                f"is the journal of {kept.name}, not of {mission}",
+                file=str(path),
+                remedy="name another journal, or its mission",
+            )
+        if given != journal.origin:
+            told = "goes on with the mission and settings it began with; others were given"
+            click.echo(f"note: {path} {told}", err=True)
+        return _running(kept, journal.origin), journal
+    except BaseException:
+        journal.close()
+        raise
+
+
+def _running(mission: Mission, origin: Origin) -> Running:
     from oath.allocate import Budget
     from oath.allocate import allocator as named
     from oath.scene import prepare, require_reachable
-    from oath.service.auth import access
-    from oath.service.server import Running, listen
-    from oath.service.server import serve as run
+    from oath.service.server import Running
     from oath.world.roadmap import Params
 
-    loaded, chosen = oath.load(mission), named(allocator, makespan_weight=makespan_weight)
-    with listen(host, port) as listener:
-        port = listener.getsockname()[1]
-        who, made_up = access(host=host, port=port, token=token, viewer=viewer_token)
-        scene = prepare(loaded, Params(points=points), seed)
-        require_reachable(scene)
-        running = Running(
-            scene=scene,
-            name=allocator,
-            allocator=chosen,
-            budget=Budget(seconds=budget),
-            seed=seed,
-            interpreter=_interpreter,
-        )
-        name = f"[{host}]" if ":" in host else host
-        link = f"?token={who.operator}" if made_up else ""
-        run(
-            running,
-            listener,
-            who,
-            speed=speed,
-            until_done=until_done,
-            rate=rate,
-            on_ready=lambda: click.echo(f"console: http://{name}:{port}/{link}"),
-        )
+    chosen = named(origin.allocator, makespan_weight=origin.makespan_weight)
+    scene = prepare(mission, Params(points=origin.points), origin.seed)
+    require_reachable(scene)
+    return Running(
+        scene=scene,
+        name=origin.allocator,
+        allocator=chosen,
+        budget=Budget(seconds=origin.seconds),
+        seed=origin.seed,
+        interpreter=_interpreter,
+    )
 
 
 def _interpreter() -> Interpreter:

@@ -19,8 +19,8 @@ from oath.events import AnyEvent, Commanded, RobotFailed
 from oath.runtime import Runtime
 from oath.service.clock import Clock
 from oath.service.history import EVERY
-from oath.service.journal import Answer
 from oath.service.snapshot import Moment
+from oath.store import Journal
 
 T = TypeVar("T")
 Happen = Callable[[Sequence[AnyEvent]], None]
@@ -35,24 +35,6 @@ WAITING = 256
 """At most so many requests wait for the mission."""
 
 _log = logging.getLogger(__name__)
-
-
-class Journal(Protocol):
-    """Where events are kept."""
-
-    def append(
-        self, events: Sequence[AnyEvent], *, id: str | None = None, answer: object = None
-    ) -> range:
-        """Store events that happen together, all or none; return their sequence numbers."""
-
-    def replay(self, since: int = 0) -> list[AnyEvent]:
-        """Return the events from a sequence number on."""
-
-    def known(self, id: str) -> Answer | None:
-        """Return what was answered to the command with this id; None if there was none."""
-
-    def close(self) -> None:
-        """Let go of the journal; may be called twice."""
 
 
 class Listener(Protocol):
@@ -96,9 +78,11 @@ class Owner(threading.Thread):
 
     Parameters
     ----------
-    open_journal, begin
-        Called in this thread: what opens the journal, and what begins or resumes the mission after
-        its events. `begin` is also given what new events must pass through before they are applied.
+    journal
+        Where every event is kept before it is applied; closed when the thread ends.
+    begin
+        Begins the mission, or resumes it after the journal's events; called in this thread. New
+        events must pass through what it is given before they are applied.
     listener
         Who is told what happens.
     speed
@@ -109,7 +93,7 @@ class Owner(threading.Thread):
 
     def __init__(
         self,
-        open_journal: Callable[[], Journal],
+        journal: Journal,
         begin: Callable[[Sequence[AnyEvent], Happen], Runtime],
         listener: Listener,
         *,
@@ -118,13 +102,12 @@ class Owner(threading.Thread):
     ) -> None:
         super().__init__(name="mission", daemon=True)
         self.clock = Clock(speed=speed)
-        self._open_journal, self._begin = open_journal, begin
+        self._journal, self._begin = journal, begin
         self._listener, self._until_done = listener, until_done
         self._requests: queue.Queue[_Request | None]
         self._requests = queue.Queue(WAITING)
         self._ready: Future[None] = Future()
         self._runtime: Runtime
-        self._journal: Journal
         self._last = -1
         self._id: str | None = None
         self._commands: list[dict[str, Any]] = []
@@ -273,7 +256,6 @@ class Owner(threading.Thread):
     def run(self) -> None:
         """Run the mission until it is told to stop."""
         try:
-            self._journal = self._open_journal()
             known = self._journal.replay()
             self._last = len(known) - 1
             self._runtime = self._begin(known, self._happen)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import signal
 import socket
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -22,12 +23,12 @@ from oath.service.app import create
 from oath.service.auth import Access, Pace
 from oath.service.feed import Feed
 from oath.service.history import EVERY, History
-from oath.service.journal import Memory
 from oath.service.live import MESSAGE
 from oath.service.metrics import Metrics
 from oath.service.owner import Happen, Owner
 from oath.service.snapshot import Moment
 from oath.service.talk import Talks
+from oath.store import Journal
 
 LAST_WORDS = 0.3
 """Clients have so long to hear how a mission ended before the server goes [s]."""
@@ -71,6 +72,7 @@ def listen(host: str, port: int) -> socket.socket:
 
 def serve(
     running: Running,
+    journal: Journal,
     listener: socket.socket,
     access: Access,
     *,
@@ -85,6 +87,8 @@ def serve(
     ----------
     running
         The mission.
+    journal
+        Where it is kept; if it holds events already, the mission is resumed.
     listener
         Where to listen.
     access
@@ -103,25 +107,35 @@ def serve(
     OathError, OSError
         If the mission cannot begin, or had to stop.
     """
-    asyncio.run(_Server(running, access, speed, until_done, rate).serve(listener, on_ready))
+    server = _Server(running, journal, access, speed, until_done, rate)
+    asyncio.run(server.serve(listener, on_ready))
 
 
 class _Server:
     """The event loop's side of a running server: hands what the mission tells to the feed."""
 
     def __init__(
-        self, running: Running, access: Access, speed: float, until_done: bool, rate: float
+        self,
+        running: Running,
+        journal: Journal,
+        access: Access,
+        speed: float,
+        until_done: bool,
+        rate: float,
     ) -> None:
         self._running, self._access, self._rate = running, access, rate
         mission = running.scene.mission
         history = History(mission, reconsiders=running.allocator.reconsiders)
         self._feed = Feed(running.scene, history)
-        self._owner = Owner(Memory, self._begin, self, speed=speed, until_done=until_done)
+        self._owner = Owner(journal, self._begin, self, speed=speed, until_done=until_done)
         self._uvicorn: _Uvicorn | None = None
+        self._stopping = False
         self._failure: BaseException | None = None
 
     async def serve(self, listener: socket.socket, on_ready: Callable[[], None]) -> None:
         self._loop = asyncio.get_running_loop()
+        for sign in (signal.SIGINT, signal.SIGTERM):
+            self._loop.add_signal_handler(sign, self._stop)
         await asyncio.to_thread(self._owner.open)
         try:
             metrics = Metrics()
@@ -142,12 +156,18 @@ class _Server:
                 timeout_keep_alive=30,
             )
             self._uvicorn = _Uvicorn(config)
+            self._uvicorn.should_exit = self._stopping
             on_ready()
             await self._uvicorn.serve(sockets=[listener])
         finally:
             await asyncio.to_thread(self._owner.stop)
         if self._failure is not None:
             raise self._failure
+
+    def _stop(self) -> None:
+        self._stopping = True
+        if self._uvicorn is not None:
+            self._uvicorn.should_exit = True
 
     # -- called in the mission's thread
 
@@ -173,23 +193,15 @@ class _Server:
 
     def _end(self) -> None:
         self._feed.end()
-        if self._uvicorn is not None:
-            self._loop.call_later(LAST_WORDS, setattr, self._uvicorn, "should_exit", True)
+        self._loop.call_later(LAST_WORDS, self._stop)
 
 
 class _Uvicorn(uvicorn.Server):
-    """Stops at a signal without passing it on: a server that is told to stop has done well."""
+    """Leaves signals to the server: one that is told to stop has done well."""
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
-        loop = asyncio.get_running_loop()
-        for signal in uvicorn.server.HANDLED_SIGNALS:
-            loop.add_signal_handler(signal, self.handle_exit, signal, None)
-        try:
-            yield
-        finally:
-            for signal in uvicorn.server.HANDLED_SIGNALS:
-                loop.remove_signal_handler(signal)
+        yield
 
 
 def begin(

@@ -12,7 +12,6 @@ from oath.service.clock import FASTEST, SLOWEST
 XY = Annotated[list[float], Field(min_length=2, max_length=2, description="[x, y] in metres")]
 
 
-
 class Given(BaseModel):
     """Something that is sent to the server; unknown keys are refused."""
 
