@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from oath.store import Origin
     from oath.store.sqlite import SqliteJournal
 
+BUDGET = 0.05
+"""Time to improve an answer of the allocator unless another is given [s]: the mission waits."""
+
 
 @click.command(
     epilog=examples(
@@ -101,7 +104,7 @@ def serve(
     settings = {
         "allocator": allocator,
         "makespan_weight": makespan_weight,
-        "seconds": budget,
+        "seconds": budget or BUDGET,
         "seed": seed,
         "points": points,
     }
