@@ -36,7 +36,8 @@ class Feed:
     def __init__(self, scene: Scene, history: History) -> None:
         self.scene, self.history = scene, history
         self.moment: Moment | None = None
-        self.poses = b""
+        self.poses, self.poses_at = b"", 0.0
+        self.moment_at = 0.0
         self.ended = False
         self._lines: dict[int, str] = {}
         self._known_at = array("d")
@@ -79,14 +80,14 @@ class Feed:
         self._known_at.extend([at] * len(events))
         self._wake()
 
-    def moved(self, poses: bytes) -> None:
-        """Robots are somewhere else."""
-        self.poses = poses
+    def moved(self, poses: bytes, at: float) -> None:
+        """Robots are somewhere else since `at` [s, wall clock]."""
+        self.poses, self.poses_at = poses, at
         self._wake()
 
-    def stands(self, moment: Moment) -> None:
-        """The mission stands so after all the events so far."""
-        self.moment = moment
+    def stands(self, moment: Moment, at: float) -> None:
+        """The mission stands so since `at` [s, wall clock], after all the events so far."""
+        self.moment, self.moment_at = moment, at
         self.history.stands(moment.state)
         self._wake()
 

@@ -96,19 +96,25 @@ class Live:
                 cursor, page = feed.page(cursor)
                 await self._send(socket, f'{{"type":"events","events":{page}}}')
                 if known_at is not None:
-                    self._metrics.lag.add(time.monotonic() - known_at)
+                    self._late("events", known_at)
             if feed.moment is not moment:
                 moment = feed.moment
                 if clock != (moment.speed, moment.paused):
                     clock = moment.speed, moment.paused
                     frame = {"type": "clock", "speed": moment.speed, "paused": moment.paused}
                     await self._send(socket, to_json(frame))
+                known_at = feed.moment_at
                 await self._send(socket, feed.state_frame(moment))
+                self._late("state", known_at)
             if feed.poses is not poses:
-                poses = feed.poses
+                poses, known_at = feed.poses, feed.poses_at
                 await self._send(socket, poses)
+                self._late("poses", known_at)
             if feed.ended and cursor == feed.last:
                 return 1001
+
+    def _late(self, frame: str, known_at: float) -> None:
+        self._metrics.lag[frame].add(time.monotonic() - known_at)
 
     async def _send(self, socket: WebSocket, frame: str | bytes) -> None:
         async with asyncio.timeout(SLOW):

@@ -24,23 +24,25 @@ class Histogram:
         self.counts[index] += 1
         self.total += seconds
 
-    def lines(self, name: str) -> Iterable[str]:
-        """Its text."""
+    def lines(self, name: str, label: str = "") -> Iterable[str]:
+        """Its text; a label is e.g. ``frame="poses"``."""
+        more, alone = (f"{label},", f"{{{label}}}") if label else ("", "")
         below = 0
         for bound, count in zip((*map(str, BUCKETS), "+Inf"), self.counts, strict=True):
             below += count
-            yield f'{name}_bucket{{le="{bound}"}} {below}'
-        yield f"{name}_sum {self.total:.6f}"
-        yield f"{name}_count {below}"
+            yield f'{name}_bucket{{{more}le="{bound}"}} {below}'
+        yield f"{name}_sum{alone} {self.total:.6f}"
+        yield f"{name}_count{alone} {below}"
 
 
 class Metrics:
-    """Counts requests, commands and how late clients hear of events."""
+    """Counts requests, commands and how late clients hear of what happens."""
 
     def __init__(self) -> None:
         self._begin = time.monotonic()
         self._requests: Counter[tuple[str, int]] = Counter()
-        self.lag = Histogram()
+        self.lag = {"events": Histogram(), "poses": Histogram(), "state": Histogram()}
+        """From when something is known until a client has been sent it."""
         self.command = Histogram()
 
     def answered(self, method: str, status: int) -> None:
@@ -88,9 +90,10 @@ class Metrics:
             ),
             *_head("oath_command_seconds", "histogram", "From a command to its answer."),
             *self.command.lines("oath_command_seconds"),
-            *_head("oath_event_lag_seconds", "histogram", "From an event to its socket."),
-            *self.lag.lines("oath_event_lag_seconds"),
+            *_head("oath_lag_seconds", "histogram", "Until a client has been sent what is new."),
         ]
+        for frame, lag in self.lag.items():
+            lines += lag.lines("oath_lag_seconds", f'frame="{frame}"')
         return "\n".join(lines) + "\n"
 
 

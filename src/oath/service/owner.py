@@ -43,11 +43,11 @@ class Listener(Protocol):
     def happened(self, events: Sequence[AnyEvent], at: float) -> None:
         """Events that follow those before are durable since `at` [s, wall clock]."""
 
-    def moved(self, poses: bytes) -> None:
-        """Robots are somewhere else, see `pack`."""
+    def moved(self, poses: bytes, at: float) -> None:
+        """Robots are somewhere else since `at` [s, wall clock], see `pack`."""
 
-    def stands(self, moment: Moment) -> None:
-        """The mission stands so, after all the events that were told."""
+    def stands(self, moment: Moment, at: float) -> None:
+        """The mission stands so since `at` [s, wall clock], after all events that were told."""
 
     def ended(self, failure: BaseException | None) -> None:
         """Nothing more will happen: all is done, or why not."""
@@ -362,13 +362,13 @@ class Owner(threading.Thread):
             poses = pack(self._runtime, self._lost)
             if poses != self._told_poses:
                 self._told_poses = poses
-                self._listener.moved(poses)
+                self._listener.moved(poses, wall)
         if now or wall >= self._moment_due or self._last - self._told_seq >= EVERY:
             self._moment_due = wall + MOMENTS_EVERY
             told = (self._last, self._runtime.now, self.clock.speed, self.clock.paused)
             if told != self._told:
                 self._told = told
-                self._listener.stands(self.moment())
+                self._listener.stands(self.moment(), wall)
 
     @property
     def _told_seq(self) -> int:

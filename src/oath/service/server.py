@@ -177,11 +177,11 @@ class _Server:
     def happened(self, events: Sequence[AnyEvent], at: float) -> None:
         self._hand(lambda: self._feed.happened(events, at))
 
-    def moved(self, poses: bytes) -> None:
-        self._hand(lambda: self._feed.moved(poses))
+    def moved(self, poses: bytes, at: float) -> None:
+        self._hand(lambda: self._feed.moved(poses, at))
 
-    def stands(self, moment: Moment) -> None:
-        self._hand(lambda: self._feed.stands(moment))
+    def stands(self, moment: Moment, at: float) -> None:
+        self._hand(lambda: self._feed.stands(moment, at))
 
     def ended(self, failure: BaseException | None) -> None:
         self._failure = failure
