@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -324,3 +325,44 @@ def test_others_need_a_token() -> None:
     done = run(MAZE, "--host", "0.0.0.0", "--port", "0")
     assert done.returncode == 2
     assert "--token" in done.stderr
+
+
+def test_a_mission_goes_on_where_it_was(tmp_path: Path) -> None:
+    journal = ("--journal", str(tmp_path / "maze.journal"))
+    with serving(MAZE, *journal, "--speed", "20", "--allocator", "greedy") as server:
+        first = server.command("once", "cancel_task", task_label="bb").json()
+        server.post("/api/clock", {"paused": True})
+        before = server.get("/api/state")
+        assert server.stop() == 0
+    with serving(MAZE, *journal, "--allocator", "lns") as server:
+        server.post("/api/clock", {"paused": True})
+        after = server.get("/api/state")
+        assert after["seq"] >= before["seq"]
+        assert after["t"] == pytest.approx(before["t"], abs=60.0)
+        carrying = {robot["id"]: robot["carrying"] for robot in before["robots"]}
+        assert {robot["id"]: robot["carrying"] for robot in after["robots"]} == carrying
+        assert server.get("/api/state", seq=before["seq"])["tasks"] == before["tasks"]
+        again = server.command("once", "cancel_task", task_label="bb").json()
+        assert again == {"seq": first["seq"], "repeated": True}
+        assert server.get("/api/events", limit=1)["events"][0]["allocator"] == "greedy"
+        assert server.stop() == 0
+        assert server.process.stderr is not None
+        assert "goes on with the mission and settings it began with" in server.process.stderr.read()
+
+
+def test_a_journal_of_another_mission(tmp_path: Path) -> None:
+    journal = ("--journal", str(tmp_path / "maze.journal"))
+    with serving(MAZE, *journal) as server:
+        in_use = run(MAZE, *journal, "--port", "0")
+        assert in_use.returncode == 2
+        assert "in use" in in_use.stderr
+        server.stop()
+    done = run("missions/office.yaml", *journal, "--port", "0")
+    assert done.returncode == 2
+    assert "is the journal of maze-25" in done.stderr
+
+
+def test_bad_missions_leave_no_journal(tmp_path: Path) -> None:
+    path = tmp_path / "maze.journal"
+    assert run(str(tmp_path / "none.yaml"), "--journal", str(path), "--port", "0").returncode == 2
+    assert not path.exists()

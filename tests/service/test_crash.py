@@ -13,12 +13,12 @@ from typing import Any
 
 import httpx
 import pytest
-from service.servers import MAZE, Server, serving
 
 import oath
 from oath.events import AnyEvent, Commanded, MissionFinished, StopServed, TaskAdded
 from oath.store.sqlite import read
 from oath.verify import verify
+from service.servers import MAZE, Server, serving
 
 OPTIONS = ("--allocator", "greedy", "--points", "300", "--rate", "1000000")
 SPOTS = [[1, 19], [11, 19], [5, 19.5], [1, 4], [1, 1.5], [19, 16.5], [19, 19], [9, 19.5]]

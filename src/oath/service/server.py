@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import gc
 import signal
 import socket
 from collections.abc import Callable, Iterator, Sequence
@@ -155,11 +156,13 @@ class _Server:
                 timeout_graceful_shutdown=3,
                 timeout_keep_alive=30,
             )
+            gc.freeze()  # what is there now stays: looking through it again and again takes time
             self._uvicorn = _Uvicorn(config)
             self._uvicorn.should_exit = self._stopping
             on_ready()
             await self._uvicorn.serve(sockets=[listener])
         finally:
+            gc.unfreeze()
             await asyncio.to_thread(self._owner.stop)
         if self._failure is not None:
             raise self._failure
