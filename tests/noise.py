@@ -161,7 +161,7 @@ def commanding(live: Live, said: str = "") -> dict[str, Any]:
     return schema
 
 
-def listen(url: str, requests: int, *, turns: int = 4, max_tokens: int = 700) -> Tally:
+def listen(url: str, requests: int, *, turns: int = 4, max_tokens: int = 400) -> Tally:
     """Hold dialogues of some turns with a model that answers noise, and confirm nothing.
 
     Noise seldom commands anything, so in every other dialogue it is made to.
