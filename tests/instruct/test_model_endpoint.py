@@ -5,16 +5,27 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
+from types import ModuleType
 from typing import Any
 
+import click
 import pytest
+from click.testing import CliRunner
 
+from missions import delivery, robot, yard
+from oath.cli.options import interpreter_options
+from oath.commands import Live
 from oath.errors import BadInput
+from oath.instruct import Dialogue, Interpreter, Reply, chosen_interpreter
 from oath.instruct.model.endpoint import Endpoint, _Guard, endpoint, opened, seconds
+from oath.scene import prepare
+from oath.state import State
+from oath.world.roadmap import Params
 
 KEY = "sk-very-secret"
 
@@ -269,3 +280,76 @@ def test_whose_key_is_whose() -> None:
 def test_a_timeout_is_a_number_of_seconds(text: str) -> None:
     with pytest.raises(BadInput):
         seconds(text)
+
+
+# -- what is chosen
+
+
+class Deaf:
+    """Stands in for the offline interpreter."""
+
+    def interpret(self, dialogue: Dialogue, live: Live) -> Reply:
+        return Reply(status="clarification", message="What do you mean?")
+
+
+@pytest.fixture
+def offline(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = ModuleType("oath.instruct.offline")
+    module.Offline = Deaf  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "oath.instruct.offline", module)
+
+
+@pytest.mark.usefixtures("offline")
+def test_without_a_model_nothing_is_asked() -> None:
+    assert isinstance(chosen_interpreter({}), Deaf)
+    assert isinstance(chosen_interpreter({"OATH_LLM_MODEL": ""}), Deaf)
+    off = chosen_interpreter({"OATH_LLM_MODEL": "ollama:m"}, model="none")
+    assert isinstance(off, Deaf)
+
+
+@pytest.mark.usefixtures("offline")
+def test_a_model_is_chosen_by_the_environment_or_by_options(recorder: Recorder) -> None:
+    environ = {"OATH_LLM_MODEL": "vllm:m", "OATH_LLM_URL": recorder.url, "OATH_LLM_KEY": KEY}
+    scene = prepare(yard([robot("r", (1, 1))], [delivery("aa", (1, 9), (5, 9))]), Params(points=20))
+    live = Live(scene, State.of(scene.mission))
+    dialogue = Dialogue(said=("cancel aa",))
+    for given in (environ, {**environ, "OATH_LLM_HOSTS": "my.host, 127.0.0.1"}):
+        chosen_interpreter(given).interpret(dialogue, live)
+    chosen_interpreter(
+        {"OATH_LLM_KEY": KEY}, model="vllm:n", url=recorder.url, hosts=["127.0.0.1"]
+    ).interpret(dialogue, live)
+    keys = [headers.get("authorization") for _, headers, _ in recorder.seen]
+    assert keys == [None, f"Bearer {KEY}", f"Bearer {KEY}"]
+    assert [json.loads(body)["model"] for *_, body in recorder.seen] == ["m", "m", "n"]
+
+
+@pytest.mark.usefixtures("offline")
+def test_a_wrong_configuration_is_told_at_once() -> None:
+    for environ in ({"OATH_LLM_MODEL": "gpt"}, {"OATH_LLM_MODEL": "openai:m"}):
+        with pytest.raises(BadInput):
+            chosen_interpreter(environ)
+    with pytest.raises(BadInput, match="timeout"):
+        chosen_interpreter({"OATH_LLM_MODEL": "ollama:m", "OATH_LLM_TIMEOUT": "soon"})
+
+
+@pytest.mark.usefixtures("offline")
+def test_what_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("httpx2", "pydantic_ai", "pydantic_ai.direct"):
+        monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(BadInput, match=r"install oath-fleet\[llm\]"):
+        chosen_interpreter({}, model="ollama:m")
+
+
+@pytest.mark.usefixtures("offline")
+def test_the_program_gives_a_command_its_interpreter(monkeypatch: pytest.MonkeyPatch) -> None:
+    @click.command()
+    @interpreter_options
+    def listen(interpreter: Callable[[], Interpreter]) -> None:
+        click.echo(type(interpreter()).__name__)
+
+    monkeypatch.delenv("OATH_LLM_MODEL", raising=False)
+    run = CliRunner().invoke
+    assert run(listen, []).output == "Deaf\n"
+    model = ["--llm", "ollama:m", "--llm-timeout", "500ms", "--llm-host", "my.host"]
+    assert run(listen, model).output == "ModelInterpreter\n"
+    assert isinstance(run(listen, ["--llm", "gpt"]).exception, BadInput)

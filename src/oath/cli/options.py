@@ -7,11 +7,14 @@ import re
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from oath import DEFAULT_ALLOCATOR
+
+if TYPE_CHECKING:
+    from oath.instruct import Interpreter
 
 
 def examples(*lines: str) -> str:
@@ -88,9 +91,10 @@ def budget_option(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def interpreter_options(command: Callable[..., None]) -> Callable[..., None]:
-    """``--llm``, ``--llm-url``, ``--llm-timeout`` and ``--llm-host``: the command's `interpreter`.
+    """``--llm``, ``--llm-url``, ``--llm-timeout`` and ``--llm-host``.
 
-    There is no option for a key: what stands on a command line can be read by others.
+    The command is given `interpreter`, which returns the interpreter that was chosen. There is no
+    option for a key: what stands on a command line can be read by others.
     """
 
     @click.option(
@@ -120,11 +124,13 @@ def interpreter_options(command: Callable[..., None]) -> Callable[..., None]:
         llm_host: tuple[str, ...],
         **kwargs: Any,
     ) -> None:
-        from oath.instruct import chosen_interpreter
+        def interpreter() -> Interpreter:
+            from oath.instruct import chosen_interpreter
 
-        interpreter = chosen_interpreter(
-            os.environ, model=llm, url=llm_url, timeout=llm_timeout, hosts=llm_host
-        )
+            return chosen_interpreter(
+                os.environ, model=llm, url=llm_url, timeout=llm_timeout, hosts=llm_host
+            )
+
         command(*args, interpreter=interpreter, **kwargs)
 
     return with_interpreter
