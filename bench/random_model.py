@@ -32,9 +32,12 @@ def main() -> None:
                 begin = perf_counter()
                 tally = listen(url, args.requests)
                 seconds = perf_counter() - begin
-        counts = {**asdict(tally), "intents": dict(tally.intents)}
+        counts = asdict(tally)
+        proposals = counts.pop("proposals")
         shown = ", ".join(f"{key} {value}" for key, value in counts.items())
-        print(f"model {seed}: {shown}; {seconds:.0f} s")
+        print(f"model {seed}: {shown}; {seconds:.0f} s", flush=True)
+        for proposal, times in sorted(proposals.items()):
+            print(f"    {times} x {proposal}", flush=True)
 
 
 if __name__ == "__main__":

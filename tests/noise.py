@@ -124,14 +124,14 @@ class Tally:
     wrong: int = 0
     commits: int = 0
     crashes: int = 0
-    intents: Counter[str] = field(default_factory=Counter)
+    proposals: Counter[str] = field(default_factory=Counter)
 
 
 class _Deaf:
     """Answers if the model does not."""
 
     def interpret(self, dialogue: Dialogue, live: Live) -> Reply:
-        return Reply(status="clarification", message="FALLBACK")
+        return Reply(status="clarification", message="What do you mean?")
 
 
 def small_runtime() -> Runtime:
@@ -161,7 +161,7 @@ def commanding(live: Live, said: str = "") -> dict[str, Any]:
     return schema
 
 
-def listen(url: str, requests: int, *, turns: int = 4, max_tokens: int = 400) -> Tally:
+def listen(url: str, requests: int, *, turns: int = 4, max_tokens: int = 300) -> Tally:
     """Hold dialogues of some turns with a model that answers noise, and confirm nothing.
 
     Noise seldom commands anything, so in every other dialogue it is made to.
@@ -188,11 +188,12 @@ def listen(url: str, requests: int, *, turns: int = 4, max_tokens: int = 400) ->
         except Exception:
             tally.crashes += 1
             continue
-        tally.unusable += "FALLBACK" in answer.reply.message
+        tally.unusable += "(The language model" in answer.reply.message
         tally.question += answer.reply.status != "complete"
         if answer.reply.status == "complete":
             tally.proposal += 1
             found = [to_plain(command) for command in answer.reply.commands]
-            tally.intents.update(one["intent"] for one in found)
+            intents = ", ".join(one["intent"] for one in found)
+            tally.proposals[f"{text} -> {intents}"] += 1
             tally.wrong += found != MEANT[text]
     return tally

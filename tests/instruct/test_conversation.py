@@ -225,3 +225,14 @@ def test_only_so_much_is_listened_to(talk: Talk) -> None:
     assert isinstance(parrot, Parrot)
     heard = parrot.heard[0].said[0]
     assert heard.startswith("a b [31mx") and len(heard) == LENGTH
+
+
+def test_what_the_operator_must_hear_is_said_whatever_becomes_of_the_words(talk: Talk) -> None:
+    note = "(The language model is away.)"
+    understood = Reply(status="complete", message="", commands=(CANCEL,), note=note)
+    asked = Reply(status="clarification", message="What do you mean?", note=note)
+    speaking = talk(cancel=understood, huh=asked)
+    for words in ("cancel", "huh"):
+        message = speaking.say(words).reply.message
+        assert message.startswith(note)
+        assert len(message) > len(note) + 10

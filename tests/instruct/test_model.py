@@ -276,19 +276,39 @@ def test_a_model_acts_by_no_command_and_makes_up_no_wish(said: str, meant: Any, 
 
 
 def test_a_stop_needs_no_model(live: Live) -> None:
-    class Hears:
-        def interpret(self, dialogue: Dialogue, live: Live) -> Reply:
-            stop = parse({"intent": "pause_robot", "parameters": {"robot": "all"}})
-            return Reply(status="complete", message="", commands=(stop,))
-
     @asynccontextmanager
     async def no_model() -> AsyncIterator[Any]:
         raise AssertionError
         yield
 
-    reply = ModelInterpreter(no_model, Hears()).interpret(Dialogue(said=("stop!",)), live)
+    reply = ModelInterpreter(no_model, Hears("pause_robot", robot="all")).interpret(
+        Dialogue(said=("stop!",)), live
+    )
     assert [command.intent for command in reply.commands] == ["pause_robot"]
-    assert "language model" not in reply.message
+    assert not reply.note
+
+
+class Hears:
+    """Stands in for an offline interpreter that understands."""
+
+    def __init__(self, intent: str, **parameters: object) -> None:
+        self.command = parse({"intent": intent, "parameters": parameters})
+
+    def interpret(self, dialogue: Dialogue, live: Live) -> Reply:
+        return Reply(status="complete", message="", commands=(self.command,))
+
+
+def test_two_readings_are_asked_about(live: Live) -> None:
+    def beside(offline: Hears) -> Reply:
+        model = answering(told(("cancel_task", {"task_label": "aa"})))
+        model._offline = offline
+        return model.interpret(Dialogue(said=("drop aa to the end",)), live)
+
+    assert beside(Hears("cancel_task", task_label="AA")).status == "complete"
+    reply = beside(Hears("change_task_priority", task_label="aa", priority="low"))
+    assert (reply.status, reply.intent, reply.commands) == ("clarification", None, ())
+    assert "cancels task aa" in reply.message
+    assert "from normal to low" in reply.message
 
 
 # -- answers that cannot be used
@@ -318,8 +338,8 @@ UNUSABLE = [
 def test_an_answer_of_another_form_falls_back_visibly(answer: object, live: Live) -> None:
     reply = ask(answer, live, "cancel aa")
     assert reply.commands == ()
-    assert "language model gave no usable answer" in reply.message
-    assert "What do you mean?" in reply.message
+    assert "language model gave no usable answer" in reply.note
+    assert reply.message == "What do you mean?"
 
 
 @pytest.mark.parametrize(
@@ -337,7 +357,7 @@ def test_a_model_that_is_slow_is_not_waited_for(live: Live) -> None:
         raise AssertionError
 
     reply = saying(respond, timeout=0.05).interpret(Dialogue(said=("cancel aa",)), live)
-    assert "did not answer within 0.05 s" in reply.message
+    assert "did not answer within 0.05 s" in reply.note
 
 
 @pytest.mark.parametrize(
@@ -354,8 +374,8 @@ def test_errors_fall_back_and_tell_no_secrets(error: Exception, told: str, live:
         raise error
 
     reply = saying(respond).interpret(Dialogue(said=("cancel aa",)), live)
-    assert told in reply.message
-    assert "sk-secret" not in reply.message
+    assert told in reply.note
+    assert "sk-secret" not in str(reply)
 
 
 @pytest.mark.parametrize("reason", ["content_filter", "length", "error"])
@@ -365,7 +385,7 @@ def test_an_answer_that_was_cut_or_refused_is_not_used(reason: Any, live: Live) 
         return ModelResponse(parts=[TextPart(text)], finish_reason=reason)
 
     reply = saying(respond).interpret(Dialogue(said=("cancel aa",)), live)
-    assert (reply.commands, "no usable answer" in reply.message) == ((), True)
+    assert (reply.commands, "no usable answer" in reply.note) == ((), True)
 
 
 def test_it_works_inside_a_running_loop(live: Live) -> None:
@@ -382,7 +402,7 @@ def test_nothing_and_too_much_never_reach_the_model(said: str, live: Live) -> No
 
     reply = saying(respond).interpret(Dialogue(said=(said,)), live)
     assert (reply.status, reply.commands) == ("clarification", ())
-    assert "language model" not in reply.message
+    assert not reply.note
 
 
 # -- what the model is told

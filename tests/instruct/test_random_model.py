@@ -18,7 +18,8 @@ def test_noise_commits_nothing(seed: int, tmp_path: Path) -> None:
     write_model(path, seed)
     with served(path) as url:
         tally = listen(url, REQUESTS)
-    assert (tally.requests, tally.crashes, tally.commits, tally.wrong) == (REQUESTS, 0, 0, 0)
+    assert (tally.requests, tally.crashes, tally.commits) == (REQUESTS, 0, 0)
+    # A name that was said may come up by chance; then it is read back, and refused.
     assert tally.proposal <= REQUESTS * 0.05
     # The noise was heard: most of it had the form that was asked for.
     assert tally.unusable < REQUESTS / 2

@@ -47,6 +47,9 @@ class Reply:
         To the operator: a question about exactly what is missing, with an example, or a reason.
     commands
         Several, if one sentence asks for several. They have not passed the gate yet.
+    note
+        What the operator must hear besides, whatever becomes of the reply: that a language model
+        did not answer.
     """
 
     status: Status
@@ -55,6 +58,7 @@ class Reply:
     parameters: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     missing: tuple[str, ...] = ()
     commands: tuple[Command, ...] = ()
+    note: str = ""
 
 
 class Interpreter(Protocol):

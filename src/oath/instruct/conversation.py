@@ -110,6 +110,14 @@ class Conversation:
         self._said = (*self._said, words)[-20:]
         dialogue = Dialogue(said=self._said, draft=self._draft)
         reply = self._interpreter.interpret(dialogue, self._live())
+        answer = self._take(reply)
+        if not reply.note:
+            return answer
+        message = f"{reply.note} {answer.reply.message}"
+        return replace(answer, reply=replace(answer.reply, message=message))
+
+    def _take(self, reply: Reply) -> Answer:
+        """Propose what the interpreter understood, or let it ask."""
         if reply.status == "complete" and reply.commands:
             return self._propose(reply)
         self._drop()

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from oath.commands import Live
 from oath.instruct import Dialogue, Interpreter, Reply
-from oath.instruct.model.answer import Answer, Unusable, judge, read
+from oath.instruct.model.answer import Answer, Unusable, judge, read, settle
 from oath.instruct.model.endpoint import TIMEOUT
 from oath.instruct.model.prompt import LONGEST, answer_schema, message, plain, rules
 
@@ -73,9 +73,8 @@ class ModelInterpreter:
             # The clients raise errors of many kinds. None of them may stop the dialogue, and their
             # texts may hold anything, so they are not shown.
             why = _what_happened(error, self._timeout)
-            note = f"(The language model {why}; understood offline.)"
-            return replace(reply, message=f"{note} {reply.message}".strip())
-        return judge(answer, dialogue, live)
+            return replace(reply, note=f"(The language model {why}; understood offline.)")
+        return settle(judge(answer, dialogue, live), reply, live)
 
     def _ask(self, dialogue: Dialogue, live: Live) -> Answer:
         """Ask in a thread of its own: the caller may have an event loop, and waits no longer."""

@@ -142,6 +142,24 @@ def judge(answer: Answer, dialogue: Dialogue, live: Live) -> Reply:
     )
 
 
+def settle(reply: Reply, other: Reply, live: Live) -> Reply:
+    """Return a reply, or a question if another interpreter understood something else."""
+    if reply.status != "complete" or other.status != "complete":
+        return reply
+    try:
+        ways = [[one.filled(live) for one in way.commands] for way in (reply, other)]
+        if ways[0] == ways[1]:
+            return reply
+        said = [", ".join(one.says(live) for one in way) for way in ways]
+    except BadInput:
+        return reply
+    return Reply(
+        status="clarification",
+        message=f"I can read that in two ways: one {said[0]}; the other {said[1]}. Please say it "
+        "in other words.",
+    )
+
+
 def _judge_one(
     intent: str, parameters: dict[str, Any], said: str, draft: Draft | None, live: Live
 ) -> Command | Reply:
