@@ -18,6 +18,7 @@ from oath.cli.options import (
     allocator_option,
     budget_option,
     examples,
+    interpreter_options,
     json_option,
     mission_argument,
     points_option,
@@ -39,7 +40,10 @@ from oath.terminal import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from oath.events import AnyEvent
+    from oath.instruct import Interpreter
     from oath.model import Mission
     from oath.picture.recording import Recorder
     from oath.scene import Assigned
@@ -103,6 +107,7 @@ def main() -> None:
     type=click.Path(dir_okay=False, path_type=Path),
     help="Recording of the mission for Foxglove, Rerun and others.",
 )
+@interpreter_options
 @json_option
 def run(
     mission: Path,
@@ -114,6 +119,7 @@ def run(
     out: Path | None,
     script: Path | None,
     recorded: Path | None,
+    interpreter: Callable[[], Interpreter],
     as_json: bool,
 ) -> None:
     """Run a mission in the built-in simulator, to its last delivery."""
@@ -141,7 +147,7 @@ def run(
             on_event=on_event,
         )
         with _recorder(recorded, loaded) as recorder:
-            result = runtime.run(acts(runtime, entries))
+            result = runtime.run(acts(runtime, entries, interpreter))
             if recorder is not None:
                 recorder.play(result.events)
     if out is not None:

@@ -16,6 +16,7 @@ from oath.cli.options import (
     allocator_option,
     budget_option,
     examples,
+    interpreter_options,
     json_option,
     mission_argument,
     points_option,
@@ -43,8 +44,16 @@ LINE = 20_000
 @click.option("--dialogue", is_flag=True, help="The lines are turns of one dialogue.")
 @seed_option
 @points_option(1000)
+@interpreter_options
 @json_option
-def interpret(mission: Path, dialogue: bool, seed: int, points: int, as_json: bool) -> None:
+def interpret(
+    mission: Path,
+    dialogue: bool,
+    seed: int,
+    points: int,
+    interpreter: Callable[[], Interpreter],
+    as_json: bool,
+) -> None:
     """Interpret instructions from stdin, one a line; nothing is carried out without a yes.
 
     With --json, every line gives one JSON object: status, intent, parameters, missing, message.
@@ -54,11 +63,11 @@ def interpret(mission: Path, dialogue: bool, seed: int, points: int, as_json: bo
     import oath
 
     runtime = oath.prepare(oath.load(mission), seed=seed, points=points)
-    interpreter = _interpreter()
-    conversation = _conversation(runtime, interpreter)
+    listener = interpreter()
+    conversation = _conversation(runtime, listener)
     for line in _lines(sys.stdin):
         if not dialogue:
-            conversation = _conversation(runtime, interpreter)
+            conversation = _conversation(runtime, listener)
         answer = conversation.say(line)
         if as_json:
             click.echo(json.dumps(_plain(answer.reply), ensure_ascii=False, allow_nan=False))
@@ -97,6 +106,7 @@ def _plain(reply: Reply) -> dict[str, Any]:
     type=click.FloatRange(0.01, 1000),
     help="Mission seconds per second.",
 )
+@interpreter_options
 def chat(
     mission: Path,
     allocator: str,
@@ -105,6 +115,7 @@ def chat(
     seed: int,
     points: int,
     speed: float,
+    interpreter: Callable[[], Interpreter],
 ) -> None:
     """Run a mission live and talk to it in the terminal; end with an empty line or Ctrl-D.
 
@@ -120,7 +131,7 @@ def chat(
         seed=seed,
         points=points,
     )
-    conversation = _conversation(runtime, _interpreter())
+    conversation = _conversation(runtime, interpreter())
     runtime.start()
     begin, told = time.monotonic(), 0
     click.echo(f"{runtime.scene.mission.name} runs. Say what has changed, or ask for the status.")
@@ -179,14 +190,16 @@ def _tell_news(runtime: Runtime, told: int) -> int:
     return len(runtime.events)
 
 
-def acts(runtime: Runtime, entries: Iterable[Entry]) -> Iterator[tuple[float, Callable[[], None]]]:
+def acts(
+    runtime: Runtime, entries: Iterable[Entry], interpreter: Callable[[], Interpreter]
+) -> Iterator[tuple[float, Callable[[], None]]]:
     """What a script does in a mission, and when [s]; every answer goes to stderr."""
     from functools import partial
 
     entries = list(entries)
     if not entries:
         return
-    conversation = _conversation(runtime, _interpreter())
+    conversation = _conversation(runtime, interpreter())
     for entry in entries:
         yield entry.at, partial(_act, runtime, conversation, entry)
 
@@ -222,12 +235,6 @@ def _lines(stream: Any) -> Iterator[str]:
             while (rest := stream.readline(LINE)) and not rest.endswith("\n"):
                 pass
         yield line.rstrip("\r\n")
-
-
-def _interpreter() -> Interpreter:
-    from oath.instruct.offline import Offline
-
-    return Offline()
 
 
 def _conversation(runtime: Runtime, interpreter: Interpreter) -> Conversation:
