@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Iterator, Sequence
+from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from unittest.mock import patch
 import gguf
 import numpy as np
 import xllamacpp
+from pydantic_ai.models import Model
 
 import oath
 from missions import box, bush, delivery, robot, visit, yard
@@ -24,7 +25,7 @@ from oath.instruct.model.endpoint import endpoint, opened
 from oath.instruct.model.prompt import answer_schema
 from oath.runtime import Runtime
 
-WIDTH, HIDDEN, HEADS, CONTEXT = 32, 64, 2, 8192
+WIDTH, HIDDEN, HEADS, CONTEXT = 32, 64, 2, 4096
 
 MEANT: dict[str, list[dict[str, Any]]] = {
     "pause robot2": [{"intent": "pause_robot", "parameters": {"robot": "robot2"}}],
@@ -161,7 +162,7 @@ def commanding(live: Live, said: str = "") -> dict[str, Any]:
     return schema
 
 
-def listen(url: str, requests: int, *, turns: int = 4, max_tokens: int = 300) -> Tally:
+def listen(url: str, requests: int, *, turns: int = 4, max_tokens: int = 400) -> Tally:
     """Hold dialogues of some turns with a model that answers noise, and confirm nothing.
 
     Noise seldom commands anything, so in every other dialogue it is made to.
@@ -170,8 +171,18 @@ def listen(url: str, requests: int, *, turns: int = 4, max_tokens: int = 300) ->
     where = replace(
         endpoint({}, model="llama.cpp:noise", url=url), temperature=1.0, max_tokens=max_tokens
     )
-    interpreter = ModelInterpreter(lambda: opened(where), deaf, timeout=60.0)
     said = list(MEANT)
+
+    @asynccontextmanager
+    async def seeded() -> AsyncIterator[Model]:
+        async with opened(where) as model:
+            assert model.settings is not None
+            model.settings["seed"] = tally.requests
+            yield model
+
+    # Rules would only slow it down: it reads byte by byte and understands nothing.
+    with patch("oath.instruct.model.rules", lambda: "Make noise."):
+        interpreter = ModelInterpreter(seeded, deaf, timeout=60.0)
 
     def carry_out(commands: Sequence[Command]) -> None:
         tally.commits += 1
