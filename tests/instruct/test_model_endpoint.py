@@ -22,6 +22,7 @@ from oath.cli.options import interpreter_options
 from oath.commands import Live
 from oath.errors import BadInput
 from oath.instruct import Dialogue, Interpreter, Reply, chosen_interpreter
+from oath.instruct.model import ModelInterpreter
 from oath.instruct.model.endpoint import Endpoint, _Guard, endpoint, opened, seconds
 from oath.scene import prepare
 from oath.state import State
@@ -107,6 +108,19 @@ def others_secrets(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NO_PROXY", raising=False)
 
 
+class Deaf:
+    """Stands in for the offline interpreter."""
+
+    def interpret(self, dialogue: Dialogue, live: Live) -> Reply:
+        return Reply(status="clarification", message="What do you mean?")
+
+
+@pytest.fixture(scope="module")
+def live() -> Live:
+    mission = yard([robot("r", (1, 1))], [delivery("aa", (1, 9), (5, 9))])
+    return Live(prepare(mission, Params(points=20)), State.of(mission))
+
+
 def call(where: Endpoint) -> str:
     from pydantic_ai.direct import model_request
     from pydantic_ai.messages import ModelRequest
@@ -155,6 +169,24 @@ def test_anthropic_is_sent_the_key_in_its_own_way(
     assert path == "/v1/messages"
     assert KEY in (headers.get("x-api-key", "") + headers.get("authorization", ""))
     assert "anthropic-version" in headers
+
+
+@pytest.mark.parametrize("provider", PROVIDERS)
+def test_an_answer_is_held_to_the_schema(provider: str, recorder: Recorder, live: Live) -> None:
+    where = endpoint({}, model=f"{provider}:m", url=recorder.url)
+    ModelInterpreter(lambda: opened(where), Deaf()).interpret(Dialogue(said=("hello",)), live)
+    ((_, _, body),) = recorder.seen
+    sent = json.loads(body)
+    if provider == "anthropic":
+        (tool,) = sent["tools"]
+        assert sent["tool_choice"]["type"] in ("any", "tool")
+        schema = tool["input_schema"]
+    else:
+        assert "tools" not in sent
+        schema = sent["response_format"]["json_schema"]["schema"]
+    assert schema["required"] == ["verdict", "about", "commands"]
+    assert ("max_completion_tokens" in sent) == (provider == "openai")
+    assert sent.get("temperature") == 0.0
 
 
 def test_a_redirect_is_not_followed(recorder: Recorder) -> None:
@@ -285,13 +317,6 @@ def test_a_timeout_is_a_number_of_seconds(text: str) -> None:
 # -- what is chosen
 
 
-class Deaf:
-    """Stands in for the offline interpreter."""
-
-    def interpret(self, dialogue: Dialogue, live: Live) -> Reply:
-        return Reply(status="clarification", message="What do you mean?")
-
-
 @pytest.fixture
 def offline(monkeypatch: pytest.MonkeyPatch) -> None:
     module = ModuleType("oath.instruct.offline")
@@ -308,10 +333,8 @@ def test_without_a_model_nothing_is_asked() -> None:
 
 
 @pytest.mark.usefixtures("offline")
-def test_a_model_is_chosen_by_the_environment_or_by_options(recorder: Recorder) -> None:
+def test_a_model_is_chosen_by_the_environment_or_by_options(recorder: Recorder, live: Live) -> None:
     environ = {"OATH_LLM_MODEL": "vllm:m", "OATH_LLM_URL": recorder.url, "OATH_LLM_KEY": KEY}
-    scene = prepare(yard([robot("r", (1, 1))], [delivery("aa", (1, 9), (5, 9))]), Params(points=20))
-    live = Live(scene, State.of(scene.mission))
     dialogue = Dialogue(said=("cancel aa",))
     for given in (environ, {**environ, "OATH_LLM_HOSTS": "my.host, 127.0.0.1"}):
         chosen_interpreter(given).interpret(dialogue, live)

@@ -237,10 +237,21 @@ async def opened(where: Endpoint) -> AsyncIterator[Model]:
             return
         from openai import AsyncOpenAI
         from pydantic_ai.models.openai import OpenAIChatModel
+        from pydantic_ai.profiles.openai import OpenAIModelProfile
         from pydantic_ai.providers.openai import OpenAIProvider
+        from pydantic_ai.providers.openai_compatible import OpenAICompatibleProvider
 
-        openai = OpenAIProvider(openai_client=AsyncOpenAI(**common))
-        yield OpenAIChatModel(where.model, provider=openai, settings=settings)
+        openai = AsyncOpenAI(**common)
+        if where.provider == "openai":
+            own = OpenAIProvider(openai_client=openai)
+            yield OpenAIChatModel(where.model, provider=own, settings=settings)
+            return
+        # The servers that people run keep to a schema, and know the limit by its old name.
+        profile = OpenAIModelProfile(
+            supports_json_schema_output=True, openai_chat_supports_max_completion_tokens=False
+        )
+        other = OpenAICompatibleProvider(where.provider, openai_client=openai)
+        yield OpenAIChatModel(where.model, provider=other, settings=settings, profile=profile)
 
 
 class _Guard:
