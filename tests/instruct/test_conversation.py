@@ -236,3 +236,18 @@ def test_what_the_operator_must_hear_is_said_whatever_becomes_of_the_words(talk:
         message = speaking.say(words).reply.message
         assert message.startswith(note)
         assert len(message) > len(note) + 10
+
+
+def test_interpreting_may_last_while_the_conversation_goes_on(runtime: Runtime, talk: Talk) -> None:
+    speaking = talk(add=[ADD], cancel=[CANCEL], stop=[PAUSE])
+    speaking.say("cancel")
+    slow = speaking.hear("add")
+    assert callable(slow)
+    # A yes that comes meanwhile means nothing that was read back before.
+    assert speaking.pending is None
+    assert speaking.say("yes").done == ()
+    assert [command.intent for command in speaking.say("stop").done] == ["pause_robot"]
+    answer = speaking.take(slow())
+    assert answer.proposal is not None
+    assert happened(runtime) == ["pause_robot"]
+    assert speaking.say("yes").done == answer.proposal.commands

@@ -6,6 +6,7 @@ import secrets
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from oath.commands import Command, Live, admit, to_plain
@@ -101,23 +102,38 @@ class Conversation:
 
     def say(self, text: str) -> Answer:
         """Take up what the operator says."""
+        heard = self.hear(text)
+        return heard if isinstance(heard, Answer) else self.take(heard())
+
+    def hear(self, text: str) -> Answer | Callable[[], Reply]:
+        """Take up what the operator says, but leave the interpreting to the caller.
+
+        Returns
+        -------
+        The answer, or what asks the interpreter: that may last, so it may be called in any thread.
+        `take` makes the answer of its reply.
+        """
         words = _plain(text)
         if self.pending is not None and _folded(words) in YES:
             return self._confirmed(self.pending)
         if self.pending is not None and _folded(words) in NO:
             self.reject(self.pending.id)
             return Answer(reply=Reply(status="clarification", message="Dropped; nothing changed."))
+        # Something else was said, so a yes from now on does not mean what was read back before.
+        self.pending = None
         self._said = (*self._said, words)[-20:]
         dialogue = Dialogue(said=self._said, draft=self._draft)
-        reply = self._interpreter.interpret(dialogue, self._live())
-        answer = self._take(reply)
+        return partial(self._interpreter.interpret, dialogue, self._live())
+
+    def take(self, reply: Reply) -> Answer:
+        """Propose what the interpreter understood, or let it ask."""
+        answer = self._taken(reply)
         if not reply.note:
             return answer
         message = f"{reply.note} {answer.reply.message}"
         return replace(answer, reply=replace(answer.reply, message=message))
 
-    def _take(self, reply: Reply) -> Answer:
-        """Propose what the interpreter understood, or let it ask."""
+    def _taken(self, reply: Reply) -> Answer:
         if reply.status == "complete" and reply.commands:
             return self._propose(reply)
         self._drop()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import mimetypes
 import re
 import time
@@ -245,8 +246,12 @@ def _asking(owner: Owner, talks: Talks, metrics: Metrics) -> APIRouter:
     @router.post("/api/instructions", **_with(_shape(shapes.Replied), CONFLICT))
     async def instruct(said: shapes.Instruction, window: Window = "") -> Response:
         """Say something in words; nothing happens before the proposal is confirmed, but a pause."""
-        reply = await _possible(owner.ask(lambda: talks.say(window, said.text)))
-        return _raw(to_json({"reply": reply}))
+        heard = await _possible(owner.ask(lambda: talks.hear(window, said.text)))
+        if callable(heard):
+            # A language model may take seconds; the mission does not wait for it.
+            understood = await asyncio.to_thread(heard)
+            heard = await _possible(owner.ask(lambda: talks.take(window, understood)))
+        return _raw(to_json({"reply": heard}))
 
     @router.post("/api/proposals", **_with(_shape(shapes.Replied), CONFLICT))
     async def propose(asked: shapes.Commands, window: Window = "") -> Response:

@@ -10,7 +10,7 @@ from pydantic_core import to_jsonable_python
 
 from oath.commands import Command, to_plain
 from oath.errors import BadInput
-from oath.instruct import Interpreter
+from oath.instruct import Interpreter, Reply
 from oath.instruct.conversation import Answer, Conversation
 from oath.service.owner import Owner
 
@@ -34,10 +34,19 @@ class Talks:
         self._talks: dict[str, Conversation] = {}
         self._id: str | None = None
 
-    def say(self, window: str, text: str) -> dict[str, Any]:
-        """Take up what an operator says; return the reply as plain data."""
+    def hear(self, window: str, text: str) -> dict[str, Any] | Callable[[], Reply]:
+        """Take up what an operator says; return the reply as plain data, or what makes it.
+
+        That may last, so it is to be called in another thread; `take` makes plain data of it.
+        """
         self._open()
-        return self._plain(self._of(window).say(text))
+        heard = self._of(window).hear(text)
+        return self._plain(heard) if isinstance(heard, Answer) else heard
+
+    def take(self, window: str, reply: Reply) -> dict[str, Any]:
+        """Propose what was understood, or ask; return the reply as plain data."""
+        self._open()
+        return self._plain(self._of(window).take(reply))
 
     def propose(self, window: str, commands: Sequence[Command]) -> dict[str, Any]:
         """Read typed commands back; return the reply as plain data."""
