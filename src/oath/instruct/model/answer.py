@@ -8,6 +8,7 @@ What the operator is told is written here, never by the model.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -26,6 +27,9 @@ from oath.instruct.model.grounding import (
 )
 from oath.instruct.model.prompt import REFUSALS
 from oath.model import Point
+
+_NOT = re.compile(r"\b(?:do not|don['’]?t|must not|mustn['’]?t|never)\b", re.IGNORECASE)
+"""What turns an instruction round; a model that overlooks it would do the opposite."""
 
 MOST = 4
 """Commands taken from one instruction."""
@@ -114,8 +118,9 @@ def _read_command(found: Any) -> tuple[str, dict[str, Any]]:
 
 def judge(answer: Answer, dialogue: Dialogue, live: Live) -> Reply:
     """Make of an answer what may be proposed to the operator, or a question."""
-    if answer.verdict != "command":
-        return Reply(status="clarification", message=_with_names(REFUSALS[answer.verdict], live))
+    if answer.verdict != "command" or _NOT.search(dialogue.said[-1]):
+        reason = "negated" if answer.verdict == "command" else answer.verdict
+        return Reply(status="clarification", message=_with_names(REFUSALS[reason], live))
     draft = dialogue.draft
     said, commands = dialogue.said[-1], []
     for intent, parameters in answer.commands:
