@@ -300,7 +300,8 @@ class Hears:
         self.command = parse({"intent": intent, "parameters": parameters})
 
     def interpret(self, dialogue: Dialogue, live: Live) -> Reply:
-        return Reply(status="complete", message="", commands=(self.command,))
+        intent = self.command.intent
+        return Reply(status="complete", message="", intent=intent, commands=(self.command,))
 
 
 def test_two_readings_are_asked_about(live: Live) -> None:
@@ -314,6 +315,13 @@ def test_two_readings_are_asked_about(live: Live) -> None:
     assert (reply.status, reply.intent, reply.commands) == ("clarification", None, ())
     assert "cancels task aa" in reply.message
     assert "from normal to low" in reply.message
+
+
+def test_a_value_that_was_made_up_needs_no_question_if_all_was_understood(live: Live) -> None:
+    model = answering(told(add(task_type="special")))
+    model._offline = Hears("add_task", location=[2, 8], delivery_point="c")
+    reply = model.interpret(Dialogue(said=("a task at (2, 8) for c",)), live)
+    assert reply.commands == (model._offline.command,)
 
 
 # -- answers that cannot be used

@@ -15,7 +15,7 @@ from contextlib import AbstractAsyncContextManager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from oath.commands import Live
+from oath.commands import COMMANDS, Live
 from oath.instruct import Dialogue, Interpreter, Reply
 from oath.instruct.model.answer import Answer, Unusable, judge, read, settle
 from oath.instruct.model.endpoint import TIMEOUT
@@ -65,7 +65,7 @@ class ModelInterpreter:
                 "thing at a time.",
             )
         reply = self._offline.interpret(dialogue, live)
-        if reply.commands and all(command.immediate for command in reply.commands):
+        if reply.intent is not None and COMMANDS[reply.intent].immediate:
             return reply
         try:
             answer = self._ask(dialogue, live)

@@ -148,7 +148,13 @@ def judge(answer: Answer, dialogue: Dialogue, live: Live) -> Reply:
 
 
 def settle(reply: Reply, other: Reply, live: Live) -> Reply:
-    """Return a reply, or a question if another interpreter understood something else."""
+    """Return a reply in the light of another interpreter's.
+
+    What the other understood completely needs no question; but if both understood something and
+    not the same, the operator is asked.
+    """
+    if reply.status == "need_more_info" and other.status == "complete":
+        return other if other.intent == reply.intent else reply
     if reply.status != "complete" or other.status != "complete":
         return reply
     try:
