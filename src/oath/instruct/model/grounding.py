@@ -7,7 +7,7 @@ caught; what is meant is for the model and, in the end, for the operator to say.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 
 from oath.model import Point, Priority
@@ -188,6 +188,12 @@ def name_said(name: str, text: str, *, plural: bool = False) -> bool:
         if said == wanted and part[0][1] and part[-1][2]:
             return True
     return False
+
+
+def likeliest(names: Iterable[str], text: str) -> list[str]:
+    """The names in their order, but those first whose parts are all in a text."""
+    spoken = {piece for piece, _, _ in _pieces(text)}
+    return sorted(names, key=lambda name: not spoken.issuperset(_PIECE.findall(name.casefold())))
 
 
 def _chunks(text: str, name: str) -> Iterator[re.Match[str]]:

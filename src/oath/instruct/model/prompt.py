@@ -14,7 +14,7 @@ from typing import Any
 
 from oath.commands import COMMANDS, Live
 from oath.instruct import Dialogue, Draft
-from oath.instruct.model.grounding import name_said
+from oath.instruct.model.grounding import likeliest
 
 LONGEST = 2000
 """Most of what an operator may say at once [characters]."""
@@ -135,9 +135,7 @@ def names(live: Live, said: str = "") -> dict[str, list[str]]:
 
 def _few(known: Iterable[str], said: str) -> list[str]:
     able = [name for name in known if 0 < len(name) <= _NAME and plain(name) == name]
-    if len(able) > _NAMES:
-        able.sort(key=lambda name: not name_said(name, said))
-    return able[:_NAMES]
+    return (likeliest(able, said) if len(able) > _NAMES else able)[:_NAMES]
 
 
 _CHOICES = {
