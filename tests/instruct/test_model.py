@@ -243,6 +243,16 @@ def test_a_correction_replaces_one_value(live: Live) -> None:
     assert other.missing == ("location",)
 
 
+def test_a_new_priority_is_not_overlooked(live: Live) -> None:
+    draft = Draft(
+        intent="change_task_priority", parameters={"task_label": "aa", "priority": "high"}
+    )
+    stale = told(("change_task_priority", {}), about="draft")
+    assert ask(stale, live, "make it low", draft=draft).missing == ("priority",)
+    right = told(("change_task_priority", {"priority": "low"}), about="draft")
+    assert ask(right, live, "make it low", draft=draft).parameters["priority"] == "low"
+
+
 def test_what_was_said_of_another_matter_is_not_taken_over(live: Live) -> None:
     reply = ask(told(("cancel_task", {"task_label": "aa"})), live, "aa first", "cancel it")
     assert reply.missing == ("task_label",)

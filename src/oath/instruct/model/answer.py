@@ -11,7 +11,7 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 from oath.commands import COMMANDS, Command, Live, parse, to_plain
 from oath.errors import BadInput
@@ -26,7 +26,7 @@ from oath.instruct.model.grounding import (
     words,
 )
 from oath.instruct.model.prompt import REFUSALS
-from oath.model import Point
+from oath.model import Point, Priority
 
 _NOT = re.compile(r"\b(?:do not|don['’]?t|must not|mustn['’]?t|never)\b", re.IGNORECASE)
 """What turns an instruction round; a model that overlooks it would do the opposite."""
@@ -214,11 +214,12 @@ def _given(command: Command) -> set[str]:
 
 def _said(intent: str, name: str, value: Any, said: str, known: Any) -> bool:
     """Whether a parameter's value is in the words, or was in the draft before."""
+    if name == "priority":
+        default: Priority = COMMANDS[intent].model_fields["priority"].default or "normal"
+        usual = value if value == known else default
+        return value in get_args(Priority) and priority_said(value, usual, said)
     if value == known:
         return True
-    if name == "priority":
-        usual = COMMANDS[intent].model_fields["priority"].default or "normal"
-        return isinstance(value, str) and priority_said(value, usual, said)  # type: ignore[arg-type]
     if isinstance(value, str):
         if name == "robot" and value.casefold() == "all" and EVERY & set(words(said)):
             return True
