@@ -12,6 +12,7 @@ from oath.cli.options import (
     allocator_option,
     budget_option,
     examples,
+    interpreter_options,
     mission_argument,
     points_option,
     seed_option,
@@ -19,8 +20,9 @@ from oath.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from oath.commands import Live
-    from oath.instruct import Dialogue, Interpreter, Reply
+    from collections.abc import Callable
+
+    from oath.instruct import Interpreter
     from oath.model import Mission
     from oath.service.server import Running
     from oath.store import Origin
@@ -73,6 +75,7 @@ BUDGET = 0.05
 @budget_option
 @seed_option
 @points_option(1000)
+@interpreter_options
 def serve(
     mission: Path,
     journal: Path | None,
@@ -88,6 +91,7 @@ def serve(
     budget: float | None,
     seed: int,
     points: int,
+    interpreter: Callable[[], Interpreter],
 ) -> None:
     """Run a mission live, with a console in the browser and an API for other systems.
 
@@ -108,13 +112,16 @@ def serve(
         "seed": seed,
         "points": points,
     }
+    interpreter()  # a wrong choice is told now, not when the first words come
     with listen(host, port) as listener, TemporaryDirectory() as folder:
         port = listener.getsockname()[1]
         who, made_up = access(host=host, port=port, token=token, viewer=viewer_token)
         if journal is None:
             click.echo("note: without --journal, the mission ends with the server", err=True)
         path = journal or Path(folder, "mission.journal")
-        running, kept = (_resumed if path.exists() else _begun)(mission, path, settings)
+        running, kept = (_resumed if path.exists() else _begun)(
+            mission, path, settings, interpreter
+        )
         name = f"[{host}]" if ":" in host else host
         link = f"?token={who.operator}" if made_up else ""
         with closing(kept):
@@ -130,18 +137,22 @@ def serve(
             )
 
 
-def _begun(mission: Path, path: Path, settings: dict[str, Any]) -> tuple[Running, SqliteJournal]:
+def _begun(
+    mission: Path, path: Path, settings: dict[str, Any], interpreter: Callable[[], Interpreter]
+) -> tuple[Running, SqliteJournal]:
     """Make a mission ready and begin its journal; bad input leaves none behind."""
     import oath
     from oath.store import Origin
     from oath.store.sqlite import SqliteJournal
 
     origin = Origin.of(mission, **settings)
-    running = _running(oath.load(mission), origin)
+    running = _running(oath.load(mission), origin, interpreter)
     return running, SqliteJournal.create(path, origin)
 
 
-def _resumed(mission: Path, path: Path, settings: dict[str, Any]) -> tuple[Running, SqliteJournal]:
+def _resumed(
+    mission: Path, path: Path, settings: dict[str, Any], interpreter: Callable[[], Interpreter]
+) -> tuple[Running, SqliteJournal]:
     """Open a journal and make its mission ready as it was."""
     from oath.errors import BadInput
     from oath.store import Origin
@@ -159,13 +170,13 @@ def _resumed(mission: Path, path: Path, settings: dict[str, Any]) -> tuple[Runni
         if given != journal.origin:
             told = "goes on with the mission and settings it began with; others were given"
             click.echo(f"note: {path} {told}", err=True)
-        return _running(kept, journal.origin), journal
+        return _running(kept, journal.origin, interpreter), journal
     except BaseException:
         journal.close()
         raise
 
 
-def _running(mission: Mission, origin: Origin) -> Running:
+def _running(mission: Mission, origin: Origin, interpreter: Callable[[], Interpreter]) -> Running:
     from oath.allocate import Budget
     from oath.allocate import allocator as named
     from oath.scene import prepare, require_reachable
@@ -181,20 +192,5 @@ def _running(mission: Mission, origin: Origin) -> Running:
         allocator=chosen,
         budget=Budget(seconds=origin.seconds),
         seed=origin.seed,
-        interpreter=_interpreter,
+        interpreter=interpreter,
     )
-
-
-def _interpreter() -> Interpreter:
-    try:
-        from oath.instruct.offline import Offline
-    except ModuleNotFoundError:
-        return _Deaf()
-    return Offline()
-
-
-class _Deaf:
-    def interpret(self, dialogue: Dialogue, live: Live) -> Reply:
-        from oath.instruct import Reply
-
-        return Reply(status="clarification", message="Words are not understood yet.")
