@@ -5,6 +5,9 @@ import { LOST } from "./world.js";
 /** Notes that stand on the map at once. */
 const MOST = 3;
 
+/** How long a note stays [ms]; the list keeps it. */
+const STAYS = 20000;
+
 /** What needs the operator's eye: found obstacles, failures, stranded tasks, lost robots. */
 export class Alerts {
   /** @param {import("./world.js").World} world */
@@ -45,12 +48,13 @@ export class Alerts {
     }
   }
 
-  /** Put a note on the map until it is closed, or newer ones need its room. @param {string} text @param {string} time */
+  /** Put a note on the map for a while. @param {string} text @param {string} time */
   raise(text, time) {
     const note = el("li", {}, el("span", { class: "when" }, time), el("span", {}, text));
     const close = el("button", { type: "button", class: "quiet", "aria-label": `Dismiss: ${text}`, onclick: () => note.remove() }, "×");
     note.append(close);
     this.host.append(note);
+    setTimeout(() => note.contains(document.activeElement) || note.remove(), STAYS);
     while (this.host.children.length > MOST) this.host.firstElementChild?.remove();
   }
 

@@ -21,7 +21,7 @@ export class Bar {
     this.speed.addEventListener("change", () => this.setClock({ speed: Number(this.speed.value) }));
     world.on("clock", () => this.#clock());
     world.on("link", () => this.#link());
-    for (const topic of /** @type {const} */ (["state", "view", "events"])) world.on(topic, () => this.#figures());
+    for (const topic of /** @type {const} */ (["state", "view"])) world.on(topic, () => this.#figures());
     for (const topic of /** @type {const} */ (["view", "poses"])) world.on(topic, () => this.#time());
     setInterval(() => this.#link(), 1000);
     this.#clock();

@@ -56,11 +56,11 @@ export class Camera {
     this.centre(this.x - dx / this.scale, this.y + dy / this.scale);
   }
 
-  /** @param {number} x @param {number} y */
+  /** As far as the mission's edge is not left too far behind. @param {number} x @param {number} y */
   centre(x, y) {
     const [x0, y0, x1, y1] = this.bounds;
-    this.x = Math.max(x0, Math.min(x1, x));
-    this.y = Math.max(y0, Math.min(y1, y));
+    this.x = within(x, x0, x1, this.width / this.scale / 4);
+    this.y = within(y, y0, y1, this.height / this.scale / 4);
     this.fitted = false;
   }
 
@@ -71,4 +71,10 @@ export class Camera {
     this.scale = Math.max(least, Math.min(400, this.scale * factor));
     this.centre(x - (px - this.width / 2) / this.scale, y + (py - this.height / 2) / this.scale);
   }
+}
+
+/** @param {number} value @param {number} low @param {number} high @param {number} margin */
+function within(value, low, high, margin) {
+  if (high - low < 2 * margin) return (low + high) / 2;
+  return Math.max(low + margin, Math.min(high - margin, value));
 }

@@ -37,7 +37,7 @@ class Card {
     this.node = el(
       "div",
       { class: "card", role: "group", "aria-label": "Proposal" },
-      el("p", { class: "says" }, `OATH ${proposal.says.join("; ")}.`),
+      el("p", { class: "says" }, sentence(proposal.says.join("; "))),
       el("ul", { class: "effect" }, ...proposal.effect.map((line) => el("li", {}, line))),
       this.actions,
       this.outcome,
@@ -183,7 +183,7 @@ export class Chat {
 
   /** @param {HTMLElement} node */
   #append(node) {
-    byId("hints")?.remove();
+    document.getElementById("hints")?.remove();
     this.log.append(node);
     while (this.log.children.length > KEPT) this.log.firstElementChild?.remove();
     this.log.scrollTop = this.log.scrollHeight;
@@ -197,6 +197,11 @@ export class Chat {
     this.back = Math.max(0, Math.min(this.said.length, this.back + step));
     this.input.value = this.back ? this.said[this.said.length - this.back] : "";
   }
+}
+
+/** @param {string} text @returns {string} */
+function sentence(text) {
+  return `${text.charAt(0).toUpperCase()}${text.slice(1)}.`;
 }
 
 /** @param {unknown} error @returns {string} */

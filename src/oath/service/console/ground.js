@@ -16,6 +16,8 @@ export class Ground {
     const [x0, y0, x1, y1] = this.mission.bounds;
     const [left, top] = camera.toScreen(x0, y1);
     const [right, bottom] = camera.toScreen(x1, y0);
+    g.fillStyle = colour("bg");
+    g.fillRect(0, 0, camera.width, camera.height);
     g.fillStyle = colour("floor");
     g.fillRect(left, top, right - left, bottom - top);
     paintMesh(g, camera, this.mission.bounds);

@@ -138,7 +138,7 @@ function setUpViews(world, map) {
     ["show-roadmap", "g", "show the roadmap", roadmap],
   ];
   for (const [id, , , run] of all) byId(id).addEventListener("click", run);
-  press("show-labels", map.shows.labels);
+  for (const what of /** @type {const} */ (["paths", "trails", "labels"])) press(`show-${what}`, map.shows[what]);
   map.host.addEventListener("pointermove", () => press("follow", map.follows));
   return [...all.map(([, key, does, run]) => ({ key, does, run })), { key: "r", does: "select the next robot", run: next }];
 }

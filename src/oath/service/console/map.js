@@ -2,7 +2,7 @@ import { get } from "./api.js";
 import { Camera } from "./camera.js";
 import { Ground } from "./ground.js";
 import { markOf, paintPlans } from "./plans.js";
-import { paintRobots, sizeOf } from "./robots.js";
+import { CROWD, paintRobots, sizeOf } from "./robots.js";
 import { calm } from "./theme.js";
 
 /** Plans and tasks are painted anew at most so often [ms]; robots in every frame. */
@@ -19,7 +19,8 @@ export class LiveMap {
     this.world = world;
     this.camera = new Camera(world.mission.bounds);
     this.ground = new Ground(world.mission);
-    this.shows = { roadmap: null, trails: true, paths: true, labels: world.mission.robots.length <= 40 };
+    const few = world.mission.robots.length <= CROWD;
+    this.shows = { roadmap: null, trails: few, paths: few, labels: few };
     this.follows = false;
     /** Paints on top what a tool is drawing. @type {((g: CanvasRenderingContext2D, camera: Camera) => void) | null} */
     this.sketch = null;
@@ -28,11 +29,11 @@ export class LiveMap {
     this.asked = 0;
     /** Frames painted so far. */
     this.frames = 0;
-    this.layers = ["ground", "plans", "robots"].map(() => {
+    this.layers = [false, true, true].map((alpha) => {
       const canvas = document.createElement("canvas");
       canvas.setAttribute("aria-hidden", "true");
       host.append(canvas);
-      return /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+      return /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d", { alpha }));
     });
     new ResizeObserver(() => this.#resize()).observe(host);
     this.#resize();

@@ -4,6 +4,9 @@ import { colour, robotColour } from "./theme.js";
 /** @typedef {CanvasRenderingContext2D} Context @typedef {import("./camera.js").Camera} Camera */
 /** @typedef {import("./world.js").World} World @typedef {import("./world.js").Task} Task */
 
+/** Longer rows of tasks are counted, not drawn. */
+const ROW = 4;
+
 /** Moves of a robot that its trail shows. */
 const TRAIL = 24;
 
@@ -30,7 +33,7 @@ export function paintPlans(g, camera, world, shows) {
     const chosen = world.selected?.kind === "robot" && world.selected.id === robot.id;
     g.strokeStyle = robotColour(index);
     if (shows.trails || chosen) paintTrail(g, camera, world, robot.id, chosen ? 100000 : TRAIL);
-    if (shows.paths || chosen) paintPath(g, camera, robot, chosen);
+    if (shows.paths || chosen) paintPath(g, camera, robot, world.pose(robot.id), chosen);
   }
   paintTasks(g, camera, world, tasks, shows.labels);
 }
@@ -38,8 +41,8 @@ export function paintPlans(g, camera, world, shows) {
 /** @param {Context} g @param {Camera} camera @param {{nodes: number[][], edges: number[][]}} roadmap */
 function paintRoadmap(g, camera, { nodes, edges }) {
   g.strokeStyle = colour("muted");
-  g.lineWidth = 0.75;
-  g.globalAlpha = 0.35;
+  g.lineWidth = 0.5;
+  g.globalAlpha = 0.3;
   g.beginPath();
   for (const [i, j] of edges) trace(g, camera, [nodes[i], nodes[j]]);
   g.stroke();
@@ -96,8 +99,9 @@ function paintTrail(g, camera, world, id, most) {
   const moves = world.history.movesUntil(id, world.time, most);
   if (!moves.length) return;
   const points = [moves[0].from, ...moves.map((move) => move.to)];
-  const pose = world.pose(id);
-  points[points.length - 1] = [pose.x, pose.y];
+  const { x, y } = world.pose(id);
+  if (moves[moves.length - 1].end > world.time) points.pop();
+  points.push([x, y]);
   g.lineWidth = 2;
   g.globalAlpha = 0.3;
   g.beginPath();
@@ -106,14 +110,14 @@ function paintTrail(g, camera, world, id, most) {
   g.globalAlpha = 1;
 }
 
-/** @param {Context} g @param {Camera} camera @param {any} robot @param {boolean} chosen */
-function paintPath(g, camera, { path, route }, chosen) {
+/** @param {Context} g @param {Camera} camera @param {any} robot @param {{x: number, y: number}} pose @param {boolean} chosen */
+function paintPath(g, camera, { path, route }, pose, chosen) {
   if (path.length > 1) {
     g.lineWidth = chosen ? 3 : 1.75;
     g.setLineDash([6, 4]);
     g.globalAlpha = 0.9;
     g.beginPath();
-    trace(g, camera, path);
+    trace(g, camera, ahead(path, pose));
     g.stroke();
   }
   if (chosen && route.length > 1) {
@@ -127,19 +131,40 @@ function paintPath(g, camera, { path, route }, chosen) {
   g.globalAlpha = 1;
 }
 
-/** Tasks at the same point stand around it. @param {Context} g @param {Camera} camera @param {World} world @param {Task[]} tasks @param {boolean} labels */
+/** What is left of a way: from the point that is nearest to the robot. @param {number[][]} path @param {{x: number, y: number}} pose @returns {number[][]} */
+function ahead(path, { x, y }) {
+  let [best, least] = [0, Infinity];
+  for (let i = 0; i + 1 < path.length; i++) {
+    const [[ax, ay], [bx, by]] = [path[i], path[i + 1]];
+    const [dx, dy] = [bx - ax, by - ay];
+    const part = ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy || 1);
+    const on = Math.max(0, Math.min(1, part));
+    const far = Math.hypot(ax + on * dx - x, ay + on * dy - y);
+    if (far < least) [best, least] = [i, far];
+  }
+  return [[x, y], ...path.slice(best + 1)];
+}
+
+/** Tasks that go to the same point stand in a row above it. @param {Context} g @param {Camera} camera @param {World} world @param {Task[]} tasks @param {boolean} labels */
 function paintTasks(g, camera, world, tasks, labels) {
-  /** @type {Map<string, number>} */
-  const crowd = new Map();
+  /** @type {Map<string, Task[]>} */
+  const rows = new Map();
   for (const task of tasks) {
-    const { at } = markOf(task);
+    const [x, y] = camera.toScreen(...markOf(task).at);
     if (task.status === "done") paintDone(g, camera, task);
-    else {
-      const key = at.join();
-      const before = crowd.get(key) ?? 0;
-      crowd.set(key, before + 1);
-      paintTask(g, camera, world, task, before, labels);
-    }
+    else if (task.status === "carried") {
+      const key = markOf(task).at.join();
+      rows.set(key, [...(rows.get(key) ?? []), task]);
+    } else paintTask(g, camera, world, task, x, y, labels);
+  }
+  for (const row of rows.values()) {
+    const [x, y] = camera.toScreen(...markOf(row[0]).at);
+    const few = row.length <= ROW;
+    const marks = few ? row : row.slice(0, 1);
+    const left = x - 7 * (marks.length - 1);
+    marks.forEach((task, i) => paintTask(g, camera, world, task, left + 14 * i, y - 17, false));
+    const names = few ? row.map((task) => task.id).join(" ") : `× ${row.length}`;
+    if (labels || !few) paintLabel(g, left + 14 * (marks.length - 1), y - 17, names);
   }
 }
 
@@ -157,15 +182,8 @@ function paintDone(g, camera, task) {
   g.globalAlpha = 1;
 }
 
-/** @param {Context} g @param {Camera} camera @param {World} world @param {Task} task @param {number} before @param {boolean} labels */
-function paintTask(g, camera, world, task, before, labels) {
-  const { at } = markOf(task);
-  let [x, y] = camera.toScreen(at[0], at[1]);
-  if (task.status === "carried") {
-    const angle = Math.PI * (-0.5 + 0.28 * Math.ceil(before / 2) * (before % 2 ? 1 : -1));
-    x += 22 * Math.cos(angle);
-    y += 22 * Math.sin(angle);
-  }
+/** @param {Context} g @param {Camera} camera @param {World} world @param {Task} task @param {number} x @param {number} y @param {boolean} labels */
+function paintTask(g, camera, world, task, x, y, labels) {
   const chosen = world.selected?.kind === "task" && world.selected.id === task.id;
   if (chosen) paintErrand(g, camera, task);
   const index = task.robot === null ? undefined : world.index.get(task.robot);

@@ -8,6 +8,9 @@ const EDGE = { left: 34, right: 14, top: 8, bottom: 30 };
 /** Kinds of events that stand below the plot. */
 const MARKED = ["tasks", "obstacles", "robots", "commands"];
 
+/** While it is live it is painted at most so often [ms]. */
+const LIVE_EVERY = 500;
+
 /** The plot's own moments: routine deliveries are its steps already. */
 const ROUTINE = new Set(["stop_served"]);
 
@@ -22,13 +25,25 @@ export class Plot {
     host.append(canvas);
     this.g = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     this.asked = 0;
-    new ResizeObserver(() => this.touch()).observe(host);
+    this.paintedAt = 0;
+    new ResizeObserver(() => this.#resize()).observe(host);
+    this.#resize();
+  }
+
+  #resize() {
+    const ratio = devicePixelRatio || 1;
+    this.box = { width: this.host.clientWidth, height: this.host.clientHeight };
+    this.g.canvas.width = Math.round(this.box.width * ratio);
+    this.g.canvas.height = Math.round(this.box.height * ratio);
+    this.g.setTransform(ratio, 0, 0, ratio, 0, 0);
     this.paint();
   }
 
-  /** Paint it anew with the next frame. */
+  /** Paint it anew, at once while the past is looked at, else a little later. */
   touch() {
-    if (!this.asked) this.asked = requestAnimationFrame(() => this.paint());
+    if (this.asked) return;
+    const wait = this.world.past ? 0 : this.paintedAt + LIVE_EVERY - performance.now();
+    this.asked = setTimeout(() => requestAnimationFrame(() => this.paint()), Math.max(0, wait));
   }
 
   /** The end of the time axis [s]. */
@@ -37,7 +52,7 @@ export class Plot {
   }
 
   get width() {
-    return this.host.clientWidth - EDGE.left - EDGE.right;
+    return this.box.width - EDGE.left - EDGE.right;
   }
 
   /** @param {number} px from the left @returns {number} [s] */
@@ -53,13 +68,9 @@ export class Plot {
   /** Paint it. */
   paint() {
     this.asked = 0;
-    const { g, host } = this;
-    const [width, height, ratio] = [host.clientWidth, host.clientHeight, devicePixelRatio || 1];
-    if (g.canvas.width !== Math.round(width * ratio) || g.canvas.height !== Math.round(height * ratio)) {
-      g.canvas.width = Math.round(width * ratio);
-      g.canvas.height = Math.round(height * ratio);
-    }
-    g.setTransform(ratio, 0, 0, ratio, 0, 0);
+    this.paintedAt = performance.now();
+    const { g } = this;
+    const { width, height } = this.box;
     g.clearRect(0, 0, width, height);
     const floor = height - EDGE.bottom;
     const total = this.world.live.tasks.length || 1;
@@ -90,7 +101,7 @@ export class Plot {
     g.textAlign = "center";
     g.textBaseline = "bottom";
     const step = tick(this.span, this.width);
-    for (let t = 0; t <= this.span; t += step) {
+    for (let t = 0; this.xAt(t) < EDGE.left + this.width - 12; t += step) {
       g.fillText(t ? showTime(t).replace(/\.0/, "") : "0", this.xAt(t), floor + EDGE.bottom - 1);
     }
   }

@@ -4,8 +4,8 @@ import { LOST } from "./world.js";
 
 /** @typedef {CanvasRenderingContext2D} Context @typedef {import("./camera.js").Camera} Camera */
 
-/** More robots than this have no labels unless the map is near. */
-const CROWD = 40;
+/** Of more robots than this, ways are shown on demand, and names when the map is near. */
+export const CROWD = 40;
 
 /** @param {number} scale @param {number} radius [m] @returns {number} of a robot on the screen [px] */
 export function sizeOf(scale, radius) {

@@ -141,7 +141,7 @@ export class Table {
       row.tabIndex = -1;
       to.tabIndex = 0;
       to.focus();
-    } else if (event.key === "Enter" || event.key === " ") {
+    } else if (event.key === "Enter") {
       event.preventDefault();
       this.#choose(row.dataset.key ?? "");
     }

@@ -1,5 +1,5 @@
 import { byId, el, icon, setAttribute, setIcon, setText } from "./dom.js";
-import { plural, showStop, showTime } from "./format.js";
+import { showStop, showTime } from "./format.js";
 import { robotHue } from "./theme.js";
 import { Table } from "./table.js";
 import { inWords, kindOf } from "./words.js";
@@ -137,6 +137,7 @@ export class Tables {
           const select = /** @type {HTMLSelectElement} */ (cell.firstElementChild);
           if (document.activeElement !== select) select.value = task.priority;
           select.disabled = !this.world.acts || task.status === "done";
+          cell.classList.toggle("urgent", task.priority === "high");
         },
       },
       {
@@ -184,7 +185,13 @@ export class Tables {
           cell.classList.toggle("alarm", robot.status === "failed" || this.world.pose(robot.id).age > LOST);
         },
       },
-      { key: "next", label: "Next", text: nextOf, class: "grow" },
+      {
+        key: "next", label: "Next", class: "clip", text: nextOf,
+        update: (cell, robot) => {
+          setText(cell, nextOf(robot));
+          setAttribute(cell, "title", robot.route.map(({ stop, task }) => `${stop} ${task}`).join(", "));
+        },
+      },
       {
         key: "load", label: "Load", class: "load", text: (robot) => `${robot.carrying.length}/${about(robot).capacity}`,
         sort: (robot) => robot.carrying.length / about(robot).capacity,
@@ -197,7 +204,7 @@ export class Tables {
         },
       },
       { key: "done", label: "Done", class: "number", text: (robot) => String(robot.tasks), sort: (robot) => robot.tasks },
-      { key: "driven", label: "Driven", class: "number", text: (robot) => `${robot.driven.toFixed(0)} m`, sort: (robot) => robot.driven },
+      { key: "driven", label: "Driven", class: "number driven", text: (robot) => `${robot.driven.toFixed(0)} m`, sort: (robot) => robot.driven },
       {
         key: "hold", label: "", class: "act",
         build: (cell, { id }) => cell.append(rowButton("pause", `Pause ${id}`, () => this.#holdOrRelease(id))),
@@ -265,8 +272,7 @@ function eventColumns() {
 /** @param {Robot} robot */
 function nextOf({ route }) {
   if (!route.length) return "–";
-  const more = route.length > 1 ? `, then ${plural(route.length - 1, "stop")}` : "";
-  return `${route[0].stop} ${route[0].task}${more}`;
+  return `${route[0].stop} ${route[0].task}`;
 }
 
 /** @param {World} world @param {string | null} robot @returns {string | null} */
