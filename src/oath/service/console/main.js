@@ -1,9 +1,9 @@
 import { Alerts } from "./alerts.js";
-import { get } from "./api.js";
 import { Bar } from "./bar.js";
 import { Chat, messageOf } from "./chat.js";
 import { byId, setText } from "./dom.js";
 import { Draw } from "./draw.js";
+import { beginning } from "./early.js";
 import { setUpKeys } from "./keys.js";
 import { Link } from "./link.js";
 import { LiveMap } from "./map.js";
@@ -16,7 +16,7 @@ import { World } from "./world.js";
 
 /** Put the console together, and connect it. */
 async function start() {
-  const [me, mission, state] = await Promise.all([get("/api/me"), get("/api/mission"), get("/api/state")]);
+  const [me, mission, state] = await beginning;
   const world = new World(mission, state, me.role);
   setUpTheme(/** @type {HTMLSelectElement} */ (byId("theme")), () => world.emit("view"));
   const map = new LiveMap(byId("map"), world);
