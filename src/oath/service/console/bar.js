@@ -23,7 +23,6 @@ export class Bar {
     world.on("link", () => this.#link());
     for (const topic of /** @type {const} */ (["state", "view"])) world.on(topic, () => this.#figures());
     for (const topic of /** @type {const} */ (["view", "poses"])) world.on(topic, () => this.#time());
-    setInterval(() => this.#link(), 1000);
     this.#clock();
     this.#figures();
     this.#time();

@@ -4,6 +4,9 @@
  * @property {[number, number]} from [m] @property {[number, number]} to [m]
  */
 
+/** Moves of each robot that are kept at least; a shift of eight hours has more. */
+const KEPT = 4000;
+
 /** Everything that has happened, as the console needs it: by sequence, by robot, by time. */
 export class History {
   constructor() {
@@ -20,6 +23,8 @@ export class History {
     this.done = [];
     /** @type {Map<string, Move[]>} */
     this.moves = new Map();
+    /** Robots whose first moves are forgotten. @type {Set<string>} */
+    this.cut = new Set();
   }
 
   /** Sequence of the last event; -1: none. */
@@ -44,6 +49,10 @@ export class History {
     const moves = this.moves.get(robot);
     if (moves) moves.push({ start, end, from, to });
     else this.moves.set(robot, [{ start, end, from, to }]);
+    if (moves && moves.length > 2 * KEPT) {
+      moves.splice(0, KEPT);
+      this.cut.add(robot);
+    }
   }
 
   /** @param {number} t [s] @returns {number} sequence of the last event at or before t; >= 0 */
@@ -54,13 +63,13 @@ export class History {
   /**
    * Where a robot was.
    * @param {string} robot @param {number} t [s]
-   * @returns {{at: [number, number], heading: number | null} | null} null: it never moved
+   * @returns {{at: [number, number], heading: number | null} | null} null: no move of then is known
    */
   poseAt(robot, t) {
     const moves = this.moves.get(robot);
     if (!moves?.length) return null;
     const begun = countUntil(moves, t, (move) => move.start);
-    if (begun === 0) return { at: moves[0].from, heading: null };
+    if (begun === 0) return this.cut.has(robot) ? null : { at: moves[0].from, heading: null };
     const { start, end, from, to } = moves[begun - 1];
     const part = end > start ? Math.min(1, (t - start) / (end - start)) : 1;
     const [dx, dy] = [to[0] - from[0], to[1] - from[1]];

@@ -36,6 +36,7 @@ async function start() {
   });
   byId("retry").addEventListener("click", () => link.connect());
   link.connect();
+  setInterval(() => world.link.lostAt && world.emit("link"), 1000); // ages grow
   world.on("view", () => map.touch("ground"));
   setUpKeys(
     [
@@ -122,6 +123,7 @@ function setUpViews(world, map) {
   };
   const fit = () => {
     map.follows = false;
+    press("follow", false);
     map.move((camera) => camera.fit());
   };
   const nearer = () => map.move((camera) => camera.zoom(1.3));

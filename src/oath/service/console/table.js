@@ -11,6 +11,9 @@ import { el, setAttribute, setText } from "./dom.js";
  * @property {string} [class]
  */
 
+/** Rows that are shown at once. */
+const MOST = 300;
+
 /**
  * A sortable, filterable table that keeps its rows: only what differs is touched.
  * @template T
@@ -35,9 +38,9 @@ export class Table {
     this.rows = new Map();
     this.heads = columns.map((column) => this.#head(column));
     this.body = el("tbody", { onkeydown: (event) => this.#key(/** @type {KeyboardEvent} */ (event)) });
-    this.empty = el("p", { class: "empty", hidden: true });
+    this.note = el("p", { class: "empty", hidden: true });
     const head = el("thead", {}, el("tr", {}, ...this.heads));
-    host.append(el("table", { role: "grid", "aria-label": label }, head, this.body), this.empty);
+    host.append(el("table", { role: "grid", "aria-label": label }, head, this.body), this.note);
   }
 
   /** @param {Column<T>} column */
@@ -70,7 +73,8 @@ export class Table {
   show(items) {
     this.items = items;
     const keys = new Set();
-    const shown = this.#sorted(items.filter((item) => this.#matches(item)));
+    const found = this.#sorted(items.filter((item) => this.#matches(item)));
+    const shown = found.slice(0, MOST);
     let before = null;
     for (const item of shown) {
       const key = this.about.key(item);
@@ -89,8 +93,9 @@ export class Table {
       row.remove();
       this.rows.delete(key);
     }
-    this.empty.hidden = shown.length > 0;
-    setText(this.empty, items.length ? "Nothing matches the filter." : "Nothing here.");
+    this.note.hidden = found.length > 0 && found.length <= MOST;
+    const more = `${MOST} of ${found.length} are shown; filter or sort to see others.`;
+    setText(this.note, found.length ? more : items.length ? "Nothing matches the filter." : "Nothing here.");
     this.#mark();
   }
 

@@ -8,8 +8,8 @@ import { LOST } from "./world.js";
 /** @typedef {import("./world.js").World} World @typedef {import("./world.js").Task} Task */
 /** @typedef {import("./world.js").Robot} Robot */
 
-/** Rows of events that are shown: the newest, of those that pass the filter. */
-const EVENTS = 400;
+/** So many of the newest events are listed and filtered. */
+const EVENTS = 5000;
 
 /** Order of tasks by status: what needs attention comes first. */
 const URGENCY = ["stranded", "waiting", "assigned", "carried", "done"];
