@@ -271,7 +271,9 @@ def test_it_comes_back_after_the_server_was_killed(browser: Any, tmp_path: Path)
         first.process.kill()
         page.wait_for_selector("#lost-banner:visible")
         assert page.locator("#tasks-table select:enabled").count() == 0
-        assert page.locator("#robots-table, #map canvas").first.is_attached
+        page.keyboard.press("2")
+        console.row("robots", "robot1").get_by_text("lost").wait_for()
+        page.keyboard.press("1")
         with serving(GATES, *options, "--port", str(first.port)):
             console.live()
             page.wait_for_selector("#lost-banner", state="hidden")
