@@ -12,7 +12,7 @@ import { el, setAttribute, setText } from "./dom.js";
  */
 
 /** Rows that are shown at once. */
-const MOST = 300;
+const MOST = 200;
 
 /**
  * A sortable, filterable table that keeps its rows: only what differs is touched.
@@ -84,7 +84,11 @@ export class Table {
         if (column.text && !column.update) setText(cells[i], column.text(item));
         column.update?.(cells[i], item);
       });
-      const next = before ? before.nextSibling : this.body.firstChild;
+      let next = before ? before.nextSibling : this.body.firstChild;
+      if (next && next !== row && next.nextSibling === row) {
+        this.body.append(next); // one row left: it need not push all others
+        next = row;
+      }
       if (next !== row) this.body.insertBefore(row, next);
       before = row;
     }

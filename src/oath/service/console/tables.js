@@ -112,7 +112,7 @@ export class Tables {
         },
       },
       {
-        key: "status", label: "Status", text: (task) => task.status,
+        key: "status", label: "Status", class: "status", text: (task) => task.status,
         sort: (task) => URGENCY.indexOf(task.status),
         update: (cell, task) => {
           setText(cell, task.status);
@@ -120,23 +120,24 @@ export class Tables {
           cell.classList.toggle("alarm", task.status === "stranded");
         },
       },
-      { key: "robot", label: "Robot", text: (task) => task.robot ?? "–" },
+      { key: "robot", label: "Robot", class: "robot", text: (task) => task.robot ?? "–" },
       {
-        key: "to", label: "To", text: (task) => showStop(task.stops[task.stops.length - 1]),
+        key: "to", label: "To", class: "clip", text: (task) => showStop(task.stops[task.stops.length - 1]),
         update: (cell, task) => {
           setText(cell, showStop(task.stops[task.stops.length - 1]));
           setAttribute(cell, "title", task.stops.map(showStop).join(" → "));
         },
       },
-      { key: "type", label: "Type", text: (task) => task.type },
+      { key: "type", label: "Type", class: "type", text: (task) => task.type },
       {
-        key: "priority", label: "Priority", text: (task) => task.priority,
+        key: "priority", label: "Priority", class: "priority", text: (task) => task.priority,
         sort: (task) => PRIORITIES.indexOf(task.priority),
         build: (cell, task) => cell.append(this.#priority(task)),
         update: (cell, task) => {
           const select = /** @type {HTMLSelectElement} */ (cell.firstElementChild);
-          if (document.activeElement !== select) select.value = task.priority;
-          select.disabled = !this.world.acts || task.status === "done";
+          const free = this.world.acts && task.status !== "done";
+          if (document.activeElement !== select && select.value !== task.priority) select.value = task.priority;
+          if (select.disabled === free) select.disabled = !free;
           cell.classList.toggle("urgent", task.priority === "high");
         },
       },
@@ -179,7 +180,7 @@ export class Tables {
         update: () => {},
       },
       {
-        key: "status", label: "Status", text: (robot) => this.#statusOf(robot),
+        key: "status", label: "Status", class: "status", text: (robot) => this.#statusOf(robot),
         update: (cell, robot) => {
           setText(cell, this.#statusOf(robot));
           cell.classList.toggle("alarm", robot.status === "failed" || this.world.pose(robot.id).age > LOST);
