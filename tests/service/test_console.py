@@ -153,6 +153,34 @@ def test_a_drawn_obstacle_stands_on_the_map(console: Console) -> None:
 
 @pytest.mark.slow
 @in_browser
+def test_the_map_moves_and_shows_more_on_demand(console: Console) -> None:
+    page = console.open()
+    scale = page.evaluate("oath.map.camera.scale")
+    page.mouse.move(500, 400)
+    page.mouse.wheel(0, -400)
+    console.until("old => oath.map.camera.scale > old", scale)
+    page.focus("#map")
+    at = page.evaluate("oath.map.camera.x")
+    page.keyboard.press("ArrowLeft")
+    assert page.evaluate("oath.map.camera.x") < at
+    page.keyboard.press("r")
+    page.keyboard.press("f")
+    console.until(
+        "() => { const { x } = oath.world.pose('robot1'); const { map } = oath;"
+        " return map.follows && Math.abs(map.camera.toScreen(x, 0)[0]) < 1440; }"
+    )
+    assert page.get_attribute('#robots-table tr[data-key="robot1"]', "aria-selected") == "true"
+    page.keyboard.press("g")
+    page.wait_for_selector('#show-roadmap[aria-pressed="true"]')
+    page.keyboard.press("0")
+    assert page.evaluate("oath.map.camera.scale") == scale
+    x, y = page.evaluate("oath.map.camera.toScreen(1, 1.5)")
+    page.click("#map", position={"x": x, "y": y})
+    assert console.row("tasks", "gb").get_attribute("aria-selected") == "true"
+
+
+@pytest.mark.slow
+@in_browser
 def test_tables_ask_for_changes(console: Console) -> None:
     page = console.open()
     console.row("tasks", "ee").locator("select").select_option("high")
