@@ -262,7 +262,7 @@ function eventColumns() {
   return [
     { key: "t", label: "Time", class: "number", text: (event) => showTime(event.t), sort: (event) => event.seq },
     {
-      key: "kind", label: "Kind", text: kindOf, class: "name",
+      key: "kind", label: "Kind", text: kindOf, class: "kind",
       build: (cell, event) => cell.append(icon(`event-${kindOf(event)}`), el("span", {}, kindOf(event))),
       update: () => {},
     },
