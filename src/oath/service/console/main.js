@@ -22,7 +22,7 @@ async function start() {
   const map = new LiveMap(byId("map"), world);
   const chat = new Chat(world);
   const draw = new Draw(map, (commands, words, edit) => chat.propose(commands, words, edit));
-  new Tables(world, (commands, words) => chat.propose(commands, words), map);
+  new Tables(world, (commands, words) => chat.propose(commands, words));
   const bar = new Bar(world, (text, alarm) => chat.tell(text, alarm));
   const timeline = new Timeline(world);
   new Alerts(world);

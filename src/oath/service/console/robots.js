@@ -19,7 +19,7 @@ export function sizeOf(scale, radius) {
 export function paintRobots(g, camera, world) {
   const { mission, poses } = world;
   const named = mission.robots.length <= CROWD || camera.scale > 30;
-  const flies = mission.robots[0]?.motion;
+  const usual = mission.robots[0]?.motion;
   world.shown.robots.forEach((robot) => {
     const index = world.index.get(robot.id) ?? 0;
     const about = mission.robots[index];
@@ -32,8 +32,8 @@ export function paintRobots(g, camera, world) {
     if (chosen) paintHalo(g, x, y, size);
     const dead = lost || robot.status === "failed";
     const tint = dead ? colour("muted") : robotColour(index);
-    const outline = about.motion === flies ? round : square;
-    paintBody(g, x, y, size, poses[4 * index + 2], tint, outline, dead);
+    const square = about.motion !== usual;
+    paintBody(g, x, y, poses[4 * index + 2], { tint, size, square, dead });
     paintStatus(g, x, y, size, robot.status);
     if (robot.carrying.length) paintLoad(g, x, y, size, robot.carrying.length, about.capacity);
     if (named || chosen) {
@@ -43,30 +43,55 @@ export function paintRobots(g, camera, world) {
   });
 }
 
-/** @param {Context} g @param {number} r */
-function round(g, r) {
-  g.arc(0, 0, r, 0, 2 * Math.PI);
+/**
+ * Bodies are painted once for each look and then copied: paths cost much more.
+ * @type {Map<string, HTMLCanvasElement>}
+ */
+const bodies = new Map();
+
+/** So many looks are kept; zooming makes new ones. */
+const LOOKS = 100;
+
+/** @typedef {{tint: string, size: number, square: boolean, dead: boolean}} Look */
+
+/** @param {Context} g @param {number} x @param {number} y @param {number} heading @param {Look} look */
+function paintBody(g, x, y, heading, look) {
+  const ratio = devicePixelRatio || 1;
+  const body = bodyOf(look, ratio);
+  const half = body.width / 2 / ratio;
+  const [sin, cos] = [Math.sin(-heading), Math.cos(-heading)];
+  g.setTransform(ratio * cos, ratio * sin, -ratio * sin, ratio * cos, ratio * x, ratio * y);
+  g.drawImage(body, -half, -half, 2 * half, 2 * half);
+  g.setTransform(ratio, 0, 0, ratio, 0, 0);
 }
 
-/** @param {Context} g @param {number} r */
-function square(g, r) {
-  g.rect(-0.88 * r, -0.88 * r, 1.76 * r, 1.76 * r);
+/** @param {Look} look @param {number} ratio pixels of the screen per pixel @returns {HTMLCanvasElement} */
+function bodyOf(look, ratio) {
+  const { tint, size, square, dead } = look;
+  const key = [tint, colour("floor"), size, square, dead, ratio].join();
+  const known = bodies.get(key);
+  if (known) return known;
+  if (bodies.size >= LOOKS) bodies.clear();
+  const canvas = document.createElement("canvas");
+  canvas.width = canvas.height = 2 * Math.ceil((size + 2) * ratio);
+  const g = /** @type {Context} */ (canvas.getContext("2d"));
+  g.setTransform(ratio, 0, 0, ratio, canvas.width / 2, canvas.width / 2);
+  paintLook(g, look);
+  bodies.set(key, canvas);
+  return canvas;
 }
 
-/** @param {Context} g @param {number} x @param {number} y @param {number} size @param {number} heading @param {string} tint @param {(g: Context, r: number) => void} outline @param {boolean} dead */
-function paintBody(g, x, y, size, heading, tint, outline, dead) {
-  g.save();
-  g.translate(x, y);
-  g.rotate(-heading);
+/** A robot that heads to the right. @param {Context} g @param {Look} look */
+function paintLook(g, { tint, size, square, dead }) {
   g.beginPath();
-  outline(g, size);
+  if (square) g.rect(-0.88 * size, -0.88 * size, 1.76 * size, 1.76 * size);
+  else g.arc(0, 0, size, 0, 2 * Math.PI);
   g.fillStyle = dead ? colour("floor") : tint;
   g.fill();
   g.lineWidth = dead ? 1.5 : 2;
   g.strokeStyle = dead ? tint : colour("floor");
   if (dead) g.setLineDash([3, 2]);
   g.stroke();
-  g.setLineDash([]);
   g.beginPath();
   g.moveTo(size * 0.68, 0);
   g.lineTo(-size * 0.42, size * 0.46);
@@ -75,7 +100,6 @@ function paintBody(g, x, y, size, heading, tint, outline, dead) {
   g.closePath();
   g.fillStyle = dead ? tint : colour("floor");
   g.fill();
-  g.restore();
 }
 
 /** @param {Context} g @param {number} x @param {number} y @param {number} size */

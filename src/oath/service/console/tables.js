@@ -11,6 +11,9 @@ import { LOST } from "./world.js";
 /** So many of the newest events are listed and filtered. */
 const EVENTS = 5000;
 
+/** Tables of more rows are long. */
+const MANY = 100;
+
 /** Order of tasks by status: what needs attention comes first. */
 const URGENCY = ["stranded", "waiting", "assigned", "carried", "done"];
 const PRIORITIES = ["low", "normal", "high"];
@@ -22,11 +25,11 @@ const PRIORITIES = ["low", "normal", "high"];
 
 /** The tables beside the map: tasks, robots, obstacles and events. */
 export class Tables {
-  /** @param {World} world @param {Ask} ask @param {import("./map.js").LiveMap} map */
-  constructor(world, ask, map) {
+  /** @param {World} world @param {Ask} ask */
+  constructor(world, ask) {
     this.world = world;
     this.ask = ask;
-    this.map = map;
+    this.waiting = 0;
     this.tasks = this.#table("tasks", "Tasks", this.#taskColumns());
     this.robots = this.#table("robots", "Robots", this.#robotColumns());
     this.obstacles = this.#table("obstacles", "Obstacles", this.#obstacleColumns());
@@ -37,7 +40,7 @@ export class Tables {
     const filter = /** @type {HTMLInputElement} */ (byId("filter"));
     filter.addEventListener("input", () => this.#filtered(filter.value));
     byId("kinds").addEventListener("change", () => this.#showEvents());
-    world.on("state", () => this.show());
+    world.on("state", () => this.#soon());
     world.on("events", () => this.#showEvents());
     for (const topic of /** @type {const} */ (["link", "view"])) world.on(topic, () => this.show());
     world.on("view", () => this.#showEvents());
@@ -55,8 +58,17 @@ export class Tables {
     });
   }
 
+  /** Long tables follow the live state more slowly: the map comes first. */
+  #soon() {
+    const { tasks, robots } = this.world.shown;
+    if (this.world.past || Math.max(tasks.length, robots.length) <= MANY) this.show();
+    else this.waiting ||= setTimeout(() => this.show(), 1000);
+  }
+
   /** Show the state that is looked at. */
   show() {
+    clearTimeout(this.waiting);
+    this.waiting = 0;
     const { shown } = this.world;
     const open = document.querySelector('[role="tab"][aria-selected="true"]')?.id;
     if (open === "tab-tasks") this.tasks.show(this.#byUrgency(shown.tasks));
