@@ -105,6 +105,26 @@ def test_robots_move_and_their_state_is_told(console: Console) -> None:
 
 @pytest.mark.slow
 @in_browser
+def test_tables_sort_and_filter(console: Console) -> None:
+    page = console.open()
+    first = page.locator("#tasks-table tbody tr").first
+    page.click("#tasks-table th >> text=Task")
+    assert first.get_attribute("data-key") == "bb"
+    page.click("#tasks-table th >> text=Task")
+    assert first.get_attribute("data-key") == "he"
+    page.fill("#filter", "he")
+    assert page.locator("#tasks-table tbody tr").count() == 1
+    page.fill("#filter", "no such thing")
+    page.wait_for_selector("text=Nothing matches the filter.")
+    page.fill("#filter", "")
+    page.click("#tab-events")
+    page.select_option("#kinds", "mission")
+    page.click("#events-table >> text=mission maze-25-gates starts")
+    page.wait_for_selector("#past-banner:visible")
+
+
+@pytest.mark.slow
+@in_browser
 def test_words_become_a_task(console: Console) -> None:
     page = console.open()
     page.fill("#say", "there is a special task aa at (5, 19.5), deliver it to c")

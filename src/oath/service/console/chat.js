@@ -62,14 +62,15 @@ class Card {
       const { seq } = await post(`/api/proposals/${this.proposal.id}/confirm`, {});
       this.#close(`Confirmed, event ${seq}.`, false);
     } catch (error) {
-      this.#close(`Not done: ${messageOf(error)}`, true);
+      const unknown = "No answer. The events show whether it happened.";
+      this.#close(error.status === 0 ? unknown : `Not done: ${messageOf(error)}`, true);
     }
   }
 
-  /** Drop it. */
-  reject() {
+  /** Drop it. @param {string} [why] */
+  reject(why = "Rejected") {
     if (!this.open) return;
-    this.#close("Rejected: nothing was changed.", false);
+    this.#close(`${why}: nothing was changed.`, false);
     post(`/api/proposals/${this.proposal.id}/reject`, {}).catch(() => {});
   }
 
@@ -156,7 +157,7 @@ export class Chat {
   /** @param {any} reply @param {() => void} again @param {() => void} edit */
   #answer({ status, message, proposal }, again, edit) {
     if (!proposal) return this.#add(status === "complete" ? "oath" : "oath question", message);
-    this.card?.reject();
+    this.card?.reject("Replaced by the next proposal");
     const decided = (/** @type {Card} */ card) => {
       if (this.card === card) this.card = null;
     };

@@ -28,6 +28,8 @@ import { History } from "./history.js";
 /** A robot that has not been heard of for longer is lost [s]. */
 export const LOST = 3;
 
+const TOO_MANY = 429;
+
 const FIELDS = 4; // x, y, heading, age
 
 /** What the console knows: the mission, its newest state, its history, and what is looked at. */
@@ -39,7 +41,7 @@ export class World {
     /** The newest snapshot. */
     this.live = state;
     this.history = new History();
-    /** The moment of the past that is looked at. @type {{t: number, state: Snapshot} | null} */
+    /** The moment of the past that is looked at. @type {{t: number, seq: number, state: Snapshot} | null} */
     this.past = null;
     /** @type {{status: string, retryAt: number, lostAt: number}} */
     this.link = { status: "connecting", retryAt: 0, lostAt: 0 };
@@ -206,7 +208,7 @@ export class World {
   /** Look at a moment of the past. @param {number} t [s] */
   lookAt(t) {
     const clamped = Math.max(0, Math.min(t, this.t));
-    this.past = { t: clamped, state: this.past?.state ?? this.live };
+    this.past = { seq: this.live.seq, state: this.live, ...this.past, t: clamped };
     this.wanted = this.history.seqAt(clamped);
     this.emit("view");
     this.#fetchPast();
@@ -223,19 +225,19 @@ export class World {
 
   /** Get the snapshot that is wanted; one request at a time, the latest wish wins. */
   async #fetchPast() {
-    if (this.fetching || !this.past || this.past.state.seq === this.wanted) return;
+    if (this.fetching) return;
     this.fetching = true;
-    const seq = this.wanted;
-    try {
-      const state = await get(`/api/state?seq=${seq}`);
-      if (this.past) {
-        this.past = { ...this.past, state };
-        this.emit("state");
+    while (this.past && this.past.seq !== this.wanted) {
+      const seq = this.wanted;
+      try {
+        const state = await get(`/api/state?seq=${seq}`);
+        if (this.past) this.past = { ...this.past, seq, state };
+        if (this.past) this.emit("state");
+      } catch (error) {
+        if (error.status !== TOO_MANY) this.returnToLive();
+        await new Promise((resume) => setTimeout(resume, 300));
       }
-    } catch {
-      this.wanted = -1;
     }
     this.fetching = false;
-    if (this.wanted >= 0 && this.wanted !== seq) this.#fetchPast();
   }
 }
