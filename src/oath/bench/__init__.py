@@ -37,6 +37,7 @@ STUDIES: dict[str, Callable[[], Study]] = {
         "scaling",
         "automaton",
         "churn",
+        "language",
         "instructions",
         "latency",
     )

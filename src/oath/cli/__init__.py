@@ -393,8 +393,8 @@ def bench(study: str, quick: bool, seeds: int, out: Path) -> None:
     """Run a study of the paper, or all of them, and write tables, plots and a report.
 
     An interrupted study goes on where it stopped. STUDY is one of: sampling, tuning, clusters,
-    types, selection, efficiency, endtoend, optimality, scaling, automaton, churn, instructions,
-    latency, all.
+    types, selection, efficiency, endtoend, optimality, scaling, automaton, churn, language,
+    instructions, latency, all.
     """
     from oath import bench as studies
 
