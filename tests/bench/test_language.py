@@ -279,7 +279,7 @@ def test_table_figure_and_finding() -> None:
     assert markdown(list(read.values()))
     chosen.plot(measured).canvas.draw()
     text = chosen.finding(measured)
-    assert "Wrong proposals: 0 of" in text and "nan" not in text
+    assert "Wrong proposals: 0 to" in text and "nan" not in text
 
 
 def test_the_confusion_matrix_counts_intents_and_proposals() -> None:

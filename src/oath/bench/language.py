@@ -273,7 +273,7 @@ def finding(rows: Sequence[Row]) -> str:
     three = shares[f"{TITLES[MAIN]}: the paper's three intents"]
     times = [row["ms"] for row in said]
     first = [row["ms"] for row in rows if row["set"] == "first call"]
-    wrong = sum(row["wrong"] for row in said)
+    held = [row for row in said if row["set"] in (MAIN, "dialogues")]
     return (
         f"Of the paper's instructions, {sum(r['right'] for r in paper)} of {len(paper)} get the "
         f"right intent or the right question (the paper: {PAPER_RIGHT} of 90), and "
@@ -285,9 +285,11 @@ def finding(rows: Sequence[Row]) -> str:
         f"{_shown(main['needless questions [%]'])} of it is asked about needlessly, and "
         f"{_shown(main['ambiguous asked about [%]'])} of what is ambiguous is asked about. Of the "
         f"dialogues {_shown(shares[TITLES['dialogues']]['right [%]'])} end as they should. Wrong "
-        f"proposals: {wrong} of all {len(said)} ({_shown(100 * wrong / len(said))}), "
-        f"{sum(row['acted'] for row in said)} of them carried out at once, as pauses are; "
-        f"{sum(row['wrong reply'] for row in said)} with those that the gate refuses. An "
+        f"proposals: {sum(row['wrong'] for row in paper)} to the paper's instructions, "
+        f"{sum(row['wrong'] for row in held)} to the {len(held)} held-out utterances and dialogues "
+        f"({_shown(_percent(held, lambda row: row['wrong']))}; "
+        f"{sum(row['wrong reply'] for row in held)} with those that the gate refuses), "
+        f"{sum(row['acted'] for row in held)} of them carried out at once, as pauses are. An "
         f"interpretation takes {np.median(times):.2f} ms (p50) and {np.percentile(times, 95):.2f} "
         f"ms (p95), the first of a process {max(first):.1f} ms with all that it loads."
     )
