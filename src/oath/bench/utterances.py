@@ -34,13 +34,14 @@ from oath.commands import (
     ResumeRobot,
     parse,
 )
-from oath.dispatch import State, advance
+from oath.dispatch import advance
 from oath.errors import BadInput
 from oath.events import Commanded, ObstacleAdded
 from oath.instruct import Dialogue, Interpreter, Reply
 from oath.instruct.conversation import Answer, Conversation
 from oath.model import Point, Polygon
 from oath.scene import prepare
+from oath.state import State
 
 Kind = Literal["full", "partial", "ambiguous", "none"]
 
