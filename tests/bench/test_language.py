@@ -177,7 +177,7 @@ def test_the_status_is_a_fair_answer_to_some_questions_only() -> None:
     fair, unfair = one_of("none", "query_status"), one_of("none", "")
     assert judge(Fake([fair], lambda _: status), fair, LIVE).right
     verdict = judge(Fake([unfair], lambda _: status), unfair, LIVE)
-    assert verdict.wrong and not verdict.right and not verdict.acted
+    assert verdict.wrong and verdict.told and not verdict.right and not verdict.acted
 
 
 def test_what_the_gate_refuses_is_no_proposal() -> None:
@@ -269,7 +269,7 @@ def test_defaults_may_be_said_and_order_does_not_matter() -> None:
 def test_table_figure_and_finding() -> None:
     chosen = study("language")
     measured = [row for name in SETS for row in rows(name)]
-    measured.append({"set": "first call", "ms": 5.0})
+    measured.append({"set": "first call", "ms": 5.0, "loading ms": 50.0})
     read = {row["what"]: row for row in table(measured)}
     main = read[TITLES["held-out"]]
     assert main["right [%]"] == main["intent right [%]"] == main["slots exact [%]"] == 100

@@ -74,6 +74,7 @@ def score(interpreter: Interpreter, said: Sequence[Utterance]) -> list[Row]:
                 "wrong": verdict.wrong,
                 "wrong reply": verdict.wrong_reply,
                 "acted": verdict.acted,
+                "told": verdict.told,
                 "right": paper_right(verdict, one) if one.paper else verdict.right,
                 "ms": 1e3 * max(verdict.seconds, default=0.0),
             }
@@ -93,26 +94,30 @@ def interpreter_of(name: str) -> Interpreter:
 def measure(name: str, interpreter: str, step: int) -> list[Row]:
     """Judge an interpreter on every `step`-th utterance of a set."""
     if name == "first call":
-        return [{"set": name, "ms": 1e3 * _first_call_elsewhere(interpreter)}]
+        loading, first = _first_call_elsewhere(interpreter)
+        return [{"set": name, "ms": 1e3 * first, "loading ms": 1e3 * loading}]
     made = interpreter_of(interpreter)
     return [{"set": name, **row} for row in score(made, SETS[name]()[::step])]
 
 
-def first_call(interpreter: str) -> float:
-    """Time the first interpretation of this process, with whatever it imports and loads [s]."""
+def first_call(interpreter: str) -> tuple[float, float]:
+    """Time making an interpreter, with all it imports, and its first interpretation [s]."""
     import time
 
     live = world(added=False)
     begin = time.perf_counter()
-    interpreter_of(interpreter).interpret(Dialogue(said=("Make task bb urgent.",)), live)
-    return time.perf_counter() - begin
+    made = interpreter_of(interpreter)
+    loaded = time.perf_counter()
+    made.interpret(Dialogue(said=("Make task bb urgent.",)), live)
+    return loaded - begin, time.perf_counter() - loaded
 
 
-def _first_call_elsewhere(interpreter: str) -> float:
-    code = "import sys; from oath.bench.language import first_call as f; print(f(sys.argv[1]))"
+def _first_call_elsewhere(interpreter: str) -> tuple[float, float]:
+    code = "import sys; from oath.bench.language import first_call as f; print(*f(sys.argv[1]))"
     command = [sys.executable, "-c", code, interpreter]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    return float(done.stdout)
+    loading, first = map(float, done.stdout.split())
+    return loading, first
 
 
 def cases(quick: bool, seeds: int, interpreter: str = OFFLINE) -> list[Case]:
@@ -272,7 +277,7 @@ def finding(rows: Sequence[Row]) -> str:
     main = shares[TITLES[MAIN]]
     three = shares[f"{TITLES[MAIN]}: the paper's three intents"]
     times = [row["ms"] for row in said]
-    first = [row["ms"] for row in rows if row["set"] == "first call"]
+    first = [row for row in rows if row["set"] == "first call"]
     held = [row for row in said if row["set"] in (MAIN, "dialogues")]
     return (
         f"Of the paper's instructions, {sum(r['right'] for r in paper)} of {len(paper)} get the "
@@ -289,9 +294,11 @@ def finding(rows: Sequence[Row]) -> str:
         f"{sum(row['wrong'] for row in held)} to the {len(held)} held-out utterances and dialogues "
         f"({_shown(_percent(held, lambda row: row['wrong']))}; "
         f"{sum(row['wrong reply'] for row in held)} with those that the gate refuses), "
-        f"{sum(row['acted'] for row in held)} of them carried out at once, as pauses are. An "
+        f"{sum(row['acted'] for row in held)} of them carried out at once, as pauses are, and "
+        f"{sum(row['told'] for row in held)} of them only told the status. An "
         f"interpretation takes {np.median(times):.2f} ms (p50) and {np.percentile(times, 95):.2f} "
-        f"ms (p95), the first of a process {max(first):.1f} ms with all that it loads."
+        f"ms (p95), the first of a process {max(row['ms'] for row in first):.1f} ms, after "
+        f"{max(row['loading ms'] for row in first):.0f} ms to load the interpreter."
     )
 
 

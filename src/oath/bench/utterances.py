@@ -202,6 +202,8 @@ class Verdict:
         The same without the gate: even if it would have refused what was not meant.
     acted
         A wrong command was carried out at once.
+    told
+        It is wrong only in that the status was told, which changes nothing.
     right
         Exact if ``full``; if ``partial``, asked for exactly what is missing; if ``ambiguous``,
         nothing was proposed; if ``none``, nothing but perhaps the status was told.
@@ -216,6 +218,7 @@ class Verdict:
     wrong: bool
     wrong_reply: bool
     acted: bool
+    told: bool
     right: bool
     seconds: tuple[float, ...]
 
@@ -246,6 +249,7 @@ def judge(interpreter: Interpreter, said: Utterance, live: Live) -> Verdict:
         wrong=wrong,
         wrong_reply=wrong_reply,
         acted=wrong and any(not isinstance(one, QueryStatus) for one in answer.done),
+        told=wrong and all(isinstance(one, QueryStatus) for one in reply.commands),
         right=_right(reply, said, exact=exact, proposed=proposed, wrong=wrong),
         seconds=tuple(listening.seconds),
     )
