@@ -11,7 +11,6 @@ from oath.events import (
     Allocated,
     AnyEvent,
     Commanded,
-    MissionFinished,
     ObstacleAdded,
     ObstacleRemoved,
     PriorityChanged,
@@ -42,7 +41,11 @@ def judge_commands(record: Record) -> Iterator[Violation]:
                 if not isinstance(later, CHANGES):
                     break
                 effect.append(later)
-            if problem := _ineffective(event.command, effect):
+            try:
+                problem = _ineffective(event.command, effect)
+            except (TypeError, ValueError):
+                problem = f"{dict(event.command)} cannot be read"
+            if problem:
                 yield Violation(rule="command", seq=seq, message=problem)
     yield from _judge_urgency(record)
 
@@ -110,7 +113,7 @@ def _judge_urgency(record: Record) -> Iterator[Violation]:
                     if waits:
                         text = f"its urgent task '{waits[0]}' has to wait for task '{waits[1]}'"
                         yield Violation(rule="priority", seq=seq, robot=robot, message=text)
-            case MissionFinished() | _:
+            case _:
                 pass
 
 
