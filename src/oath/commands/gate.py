@@ -234,10 +234,13 @@ class Trial:
                 remedy="keep it inside",
             )
         self._check_covered(event.kind, polygon)
-        before = self._shut_in()
         obstacle = Obstacle(id=event.obstacle, kind=event.kind, polygon=event.polygon)
         self._roadmap.add_obstacle(obstacle)
-        for what in sorted(self._shut_in() - before):
+        if shut_in := self._shut_in():
+            self._roadmap.remove_obstacle(obstacle.id)
+            shut_in -= self._shut_in()  # what was so before is not its fault
+            self._roadmap.add_obstacle(obstacle)
+        for what in sorted(shut_in):
             raise BadInput(
                 f"the obstacle would shut in {what}",
                 field="obstacle_location",
@@ -326,22 +329,25 @@ class Reach:
 
     def __init__(self, live: Live) -> None:
         self._live = live
-        self._parts: dict[tuple[Point, int], frozenset[int]] = {}
+        self._parts: dict[int, list[int]] = {}
+        """Part of the roadmap by node, for every mode."""
+        self._around: dict[tuple[Point, int], set[int]] = {}
 
     def all(self, robot: Robot, points: Sequence[Point]) -> bool:
         """Whether a robot can drive from where it is to all of these points [m]."""
         mode = self._live.scene.world.mode_of[robot.id]
-        parts = [self._around(at, mode) for at in (self._live.pose(robot.id), *points)]
-        return bool(frozenset.intersection(*parts))
+        here = self._at(self._live.pose(robot.id), mode)
+        return bool(here.intersection(*(self._at(at, mode) for at in points)))
 
-    def _around(self, at: Point, mode: int) -> frozenset[int]:
+    def _at(self, at: Point, mode: int) -> set[int]:
         """The parts of the roadmap that a robot at a point [m] can drive to."""
-        if (at, mode) not in self._parts:
+        if (at, mode) not in self._around:
             roadmap, avoid = self._live.scene.world.roadmap, self._live.scene.rules.avoid
-            nodes = list(roadmap.near(at, mode, avoid))
-            part = roadmap.components(mode, avoid)[nodes]
-            self._parts[at, mode] = frozenset(part.tolist())
-        return self._parts[at, mode]
+            nodes = roadmap.near(at, mode, avoid)
+            if mode not in self._parts:
+                self._parts[mode] = roadmap.components(mode, avoid).tolist()
+            self._around[at, mode] = {self._parts[mode][node] for node in nodes}
+        return self._around[at, mode]
 
 
 def _inside(at: Point, bounds: tuple[float, float, float, float], field: str) -> None:
