@@ -407,11 +407,10 @@ class Roadmap:
         reach = max(mode.radius for mode in self.modes)
         corner = np.array(obstacle.polygon)
         low, high = corner.min(axis=0) - reach, corner.max(axis=0) + reach
-        nodes, ends = self.nodes(), self.graph.ends()
-        a, b = nodes[ends[:, 0]], nodes[ends[:, 1]]
-        touched = np.flatnonzero(
-            np.all((np.minimum(a, b) <= high) & (np.maximum(a, b) >= low), axis=1)
-        ).astype(np.int32)
+        # On which sides of the box a node lies: an edge with both ends on one side stays outside.
+        (x, y), ends = self.nodes().T, self.graph.ends()
+        sides = (x < low[0]) | (x > high[0]) * 2 | (y < low[1]) * 4 | (y > high[1]) * 8
+        touched = np.flatnonzero((sides[ends[:, 0]] & sides[ends[:, 1]]) == 0).astype(np.int32)
         return self._reprice(touched)
 
     def _reprice(self, edges: NDArray[np.int32]) -> NDArray[np.int32]:
