@@ -135,7 +135,7 @@ def test_a_segment_becomes_a_rectangle_as_thick_as_the_walls() -> None:
     assert isinstance(event, ObstacleAdded)
     assert (event.obstacle, event.kind) == ("wall-1", "wall")
     assert sorted(event.polygon) == [(2, 6.9), (2, 7.1), (4, 6.9), (4, 7.1)]
-    assert said(wall) == "adds wall wall-1 from (2.0, 7.0) (4.0, 7.0)"
+    assert said(wall) == "adds wall-1 (wall) from (2.0, 7.0) to (4.0, 7.0)"
 
 
 def test_a_polygon_stays_as_it_is_and_need_not_be_closed() -> None:
@@ -150,7 +150,7 @@ def test_a_polygon_stays_as_it_is_and_need_not_be_closed() -> None:
 def test_an_obstacle_is_removed_by_its_name() -> None:
     (event,) = effect(RemoveObstacle(obstacle="Crate"))
     assert event == ObstacleRemoved(t=0.0, obstacle="crate")
-    assert said(RemoveObstacle(obstacle="crate")) == "removes gate crate"
+    assert said(RemoveObstacle(obstacle="crate")) == "removes crate (gate)"
 
 
 # --- Tasks and robots

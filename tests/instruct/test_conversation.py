@@ -251,3 +251,29 @@ def test_interpreting_may_last_while_the_conversation_goes_on(runtime: Runtime, 
     assert answer.proposal is not None
     assert happened(runtime) == ["pause_robot"]
     assert speaking.say("yes").done == answer.proposal.commands
+
+
+def test_what_was_done_at_once_can_be_corrected(talk: Talk) -> None:
+    conversation = talk(stop=[PAUSE])
+    conversation.say("stop")
+    conversation.say("I mean r2")
+    parrot = conversation._interpreter
+    assert isinstance(parrot, Parrot)
+    draft = parrot.heard[-1].draft
+    assert draft is not None and (draft.intent, draft.parameters) == (
+        "pause_robot",
+        {"robot": "r1"},
+    )
+
+
+def test_a_question_between_leaves_a_proposal_to_its_id_alone(runtime: Runtime, talk: Talk) -> None:
+    conversation = talk(add=[ADD], status=[command("query_status")])
+    proposal = conversation.say("add").proposal
+    assert proposal is not None
+    assert "tasks are done" in conversation.say("status").reply.message
+    assert not conversation.say("yes").done or happened(runtime) == []
+    again = conversation.say("add").proposal
+    assert again is not None
+    conversation.say("status")
+    conversation.confirm(again.id)
+    assert happened(runtime) == ["add_task"]

@@ -6,7 +6,7 @@ import queue
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +25,7 @@ from oath.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from oath.commands import Command
     from oath.formats.script import Entry
     from oath.instruct import Interpreter, Reply
     from oath.instruct.conversation import Answer, Conversation
@@ -64,10 +65,11 @@ def interpret(
 
     runtime = oath.prepare(oath.load(mission), seed=seed, points=points)
     listener = interpreter()
+    runtime.start()
     conversation = _conversation(runtime, listener)
     for line in _lines(sys.stdin):
-        if not dialogue:
-            conversation = _conversation(runtime, listener)
+        if not dialogue:  # nothing that one line says is carried out for the next
+            conversation = _conversation(runtime, listener, carry_out=lambda commands: None)
         answer = conversation.say(line)
         if as_json:
             click.echo(json.dumps(_plain(answer.reply), ensure_ascii=False, allow_nan=False))
@@ -237,12 +239,16 @@ def _lines(stream: Any) -> Iterator[str]:
         yield line.rstrip("\r\n")
 
 
-def _conversation(runtime: Runtime, interpreter: Interpreter) -> Conversation:
+def _conversation(
+    runtime: Runtime,
+    interpreter: Interpreter,
+    carry_out: Callable[[Sequence[Command]], Any] | None = None,
+) -> Conversation:
     from oath.instruct.conversation import Conversation
 
     return Conversation(
         interpreter,
         runtime.live,
-        lambda commands: runtime.command(commands, "operator"),
+        carry_out or (lambda commands: runtime.command(commands, "operator")),
         preview=runtime.preview,
     )

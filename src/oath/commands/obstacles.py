@@ -57,9 +57,10 @@ class ObstacleUpdate(Command):
         """See `Command`."""
         (event,) = self.events(live)
         assert isinstance(event, ObstacleAdded)
-        points = " ".join(map(show_point, self.obstacle_location))
-        shape = "from" if len(self.obstacle_location) == 2 else "with corners"
-        return f"adds {event.kind} {event.obstacle} {shape} {points}"
+        points = list(map(show_point, self.obstacle_location))
+        is_segment = len(points) == 2
+        shape = f"from {points[0]} to {points[1]}" if is_segment else f"around {' '.join(points)}"
+        return f"adds {event.obstacle} ({event.kind}) {shape}"
 
 
 def _rectangle(a: Point, b: Point, thickness: float) -> Polygon:
@@ -103,4 +104,4 @@ class RemoveObstacle(Command):
 
     def says(self, live: Live) -> str:
         """See `Command`."""
-        return f"removes {live.state.obstacles[self.obstacle].kind} {self.obstacle}"
+        return f"removes {self.obstacle} ({live.state.obstacles[self.obstacle].kind})"

@@ -99,6 +99,7 @@ class Conversation:
         self._said: tuple[str, ...] = ()
         self._draft: Draft | None = None
         self.pending: Proposal | None = None
+        self._read_back: Proposal | None = None  # what a plain yes or no is about
 
     def say(self, text: str) -> Answer:
         """Take up what the operator says."""
@@ -114,13 +115,14 @@ class Conversation:
         `take` makes the answer of its reply.
         """
         words = _plain(text)
-        if self.pending is not None and _folded(words) in YES:
-            return self._confirmed(self.pending)
-        if self.pending is not None and _folded(words) in NO:
-            self.reject(self.pending.id)
+        read_back, self._read_back = self._read_back, None
+        if read_back is not None and _folded(words) in YES:
+            return self._confirmed(read_back)
+        if read_back is not None and _folded(words) in NO:
+            self._drop()
             return Answer(reply=Reply(status="clarification", message="Dropped; nothing changed."))
-        # Something else was said, so a yes from now on does not mean what was read back before.
-        self.pending = None
+        # Something else was said, so a yes from now on does not mean what was read back before:
+        # that can still be confirmed by its id.
         self._said = (*self._said, words)[-20:]
         dialogue = Dialogue(said=self._said, draft=self._draft)
         return partial(self._interpreter.interpret, dialogue, self._live())
@@ -184,7 +186,7 @@ class Conversation:
     # -- inside
 
     def _drop(self) -> None:
-        self.pending, self._draft = None, None
+        self.pending, self._read_back, self._draft = None, None, None
 
     def _confirmed(self, proposal: Proposal) -> Answer:
         reply = _complete(proposal.commands)
@@ -205,6 +207,8 @@ class Conversation:
             done = admit(self._live(), at_once)
             if done.events:
                 self._carry_out(at_once)
+                self._drop()
+                self._note(done.commands)
             if not rest:
                 return Answer(
                     reply=replace(reply, message="\n".join(done.says)), done=done.commands
@@ -221,7 +225,7 @@ class Conversation:
                     missing=refusal.missing,
                 )
             return Answer(reply=refusal)
-        self.pending = Proposal(
+        self.pending = self._read_back = Proposal(
             id=secrets.token_urlsafe(12),
             commands=admitted.commands,
             says=admitted.says,
@@ -229,13 +233,18 @@ class Conversation:
             changes=self._live().state.changes,
             expires=self._clock() + self._lifetime,
         )
-        if len(admitted.commands) == 1:
-            plain = to_plain(admitted.commands[0])
-            self._draft = Draft(intent=plain["intent"], parameters=plain["parameters"])
+        self._note(admitted.commands)
         lines = "; ".join((*done.says, *admitted.says, *effect))
         message = f"{lines[:1].upper()}{lines[1:]}. Confirm?"
         read_back = replace(reply, message=message, commands=admitted.commands)
         return Answer(reply=read_back, proposal=self.pending, done=at_once)
+
+    def _note(self, commands: Sequence[Command]) -> None:
+        """Remember what may be corrected next: one command that was read back or done."""
+        self._draft = None
+        if len(commands) == 1:
+            plain = to_plain(commands[0])
+            self._draft = Draft(intent=plain["intent"], parameters=plain["parameters"])
 
 
 def _plain(text: str) -> str:
