@@ -32,9 +32,15 @@ def path(tmp_path: Path) -> Path:
     return path
 
 
+LOCKS = (".lock", "-shm", "-wal")
+"""What stands beside a journal that is in use; a reader leaves it there, empty."""
+
+
 def snapshot(path: Path) -> dict[str, bytes]:
-    """Return every file in the journal's folder but the lock, which is empty."""
-    return {one.name: one.read_bytes() for one in path.parent.iterdir() if one.suffix != ".lock"}
+    """Return every file in the journal's folder that holds something."""
+    found = {one.name: one.read_bytes() for one in path.parent.iterdir()}
+    assert not any(found[name] for name in found if name.endswith((".lock", "-wal")))
+    return {name: data for name, data in found.items() if not name.endswith(LOCKS)}
 
 
 def tamper(path: Path, statement: str) -> None:
@@ -54,8 +60,8 @@ def test_it_opens_as_it_was_closed(path: Path) -> None:
     assert read(path).events == some(52)
 
 
-def test_nothing_is_left_beside_a_closed_journal(path: Path) -> None:
-    assert list(snapshot(path)) == [path.name]
+def test_only_the_lock_is_left_beside_a_closed_journal(path: Path) -> None:
+    assert {one.name for one in path.parent.iterdir()} == {path.name, f"{path.name}.lock"}
 
 
 def test_every_append_is_synced(path: Path) -> None:
@@ -126,7 +132,43 @@ def test_a_reader_does_not_hold_up_the_owner(path: Path) -> None:
         assert reader.execute("SELECT count(*) FROM events").fetchone() == (50,)
     with closing(SqliteJournal(path)) as again:
         assert again.replay() == some(52)
-    assert list(snapshot(path)) == [path.name]
+    test_only_the_lock_is_left_beside_a_closed_journal(path)
+
+
+def test_a_crash_in_the_middle_of_a_checkpoint(tmp_path: Path) -> None:
+    """The file's first page is new then, and says of pages that they are there."""
+    path, crashed = tmp_path / "a.journal", tmp_path / "crashed.journal"
+    with closing(SqliteJournal.create(path, ORIGIN)) as journal:
+        journal.append(some(200))
+        for end in ("", "-wal"):
+            shutil.copy(f"{path}{end}", f"{crashed}{end}")
+        journal._db.execute("PRAGMA wal_checkpoint")
+        with crashed.open("r+b") as file:
+            file.write(path.read_bytes()[:4096])
+    assert crashed.stat().st_size < path.stat().st_size
+    for _ in range(2):
+        assert read(crashed).events == some(200)
+    with closing(SqliteJournal(crashed)) as journal:
+        assert journal.replay() == some(200)
+
+
+@pytest.mark.parametrize("t", [0, 3, -0.0, 5e-324, 1e300, 0.1 + 0.2])
+def test_any_time_is_read_back(t: float, tmp_path: Path) -> None:
+    path = tmp_path / "a.journal"
+    with closing(SqliteJournal.create(path, ORIGIN)) as journal:
+        journal.append([RobotPaused(t=t, robot="ü\0\ud800")])
+    assert read(path).events == [RobotPaused(t=t, robot="ü\0\ud800")]
+
+
+def test_ids_are_text(path: Path) -> None:
+    with closing(SqliteJournal(path)) as journal:
+        for id in ("", "ü\0x", "'; DROP TABLE events"):
+            assert journal.known(id) is None
+            journal.append([], id=id, answer=id)
+            assert journal.known(id) == Answer(range(50, 50), id)
+        with pytest.raises(BadInput, match="the id is no text"):
+            journal.append(some(1), id="\ud800")
+        assert journal.replay() == some(50)
 
 
 def test_an_interrupted_append_stores_nothing(path: Path) -> None:
@@ -254,7 +296,7 @@ def test_a_missing_file_and_a_missing_folder(tmp_path: Path) -> None:
     for use in (SqliteJournal, read):
         with pytest.raises(BadInput, match="no such file"):
             use(tmp_path / "none.journal")
-    with pytest.raises(StoreError, match="cannot be created"):
+    with pytest.raises(BadInput, match="cannot be locked"):
         SqliteJournal.create(tmp_path / "none" / "a.journal", ORIGIN)
     assert list(tmp_path.iterdir()) == []
 

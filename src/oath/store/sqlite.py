@@ -2,8 +2,8 @@
 
 Tables: `origin` and `files` hold how the mission began, `events` one event a row, `commands` the
 ids of commands with their answers. Each row of `events` carries the SHA-256 of the row before it
-and its own text; the first one that of the origin. While somebody owns the file it is in WAL mode
-and every append is synced to the disk before it returns; a closed journal is one plain file.
+and its own text; the first one that of the origin. The file is in WAL mode and every append is
+synced to the disk before it returns; a journal that was closed is one plain file.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class SqliteJournal:
         _require(self.path)
         self._owned = _own(self.path)
         try:
-            with _reading(self.path) as db:
+            with _reading(self.path, _alone(self.path)) as db:
                 self.origin, begin = _origin(db, self.path)
                 self._count, self._hash = _check(db, self.path, begin, upcasters)
             self._db = _writing(self.path)
@@ -97,18 +97,19 @@ class SqliteJournal:
             If it cannot be written.
         """
         path = Path(path)
-        if path.exists():
-            raise BadInput("exists already", file=str(path), remedy="resume it or name another")
-        # Under its own name a journal is whole from the beginning.
-        draft = path.with_name(path.name + ".part")
-        try:
-            draft.unlink(missing_ok=True)
-            with closing(_connect(draft.absolute().as_uri())) as db:
-                _begin(db, origin)
-            os.replace(draft, path)
-            _sync_folder(path.parent)
-        except (OSError, sqlite3.Error) as error:
-            raise StoreError(f"{path}: the journal cannot be created ({error})") from None
+        _forbid(path)
+        with closing(_own(path)):
+            _forbid(path)
+            # Under its own name a journal is whole from the beginning.
+            draft = path.with_name(path.name + ".part")
+            try:
+                draft.unlink(missing_ok=True)
+                with closing(_connect(draft.absolute().as_uri())) as db:
+                    _begin(db, origin)
+                os.replace(draft, path)
+                _sync_folder(path.parent)
+            except (OSError, sqlite3.Error) as error:
+                raise StoreError(f"{path}: the journal cannot be created ({error})") from None
         return cls(path)
 
     def append(
@@ -119,7 +120,8 @@ class SqliteJournal:
             seqs = range(self._count, self._count + len(events))
             rows, hash = [], self._hash
             for seq, event in zip(seqs, events, strict=True):
-                row = (seq, event.t, event.type, current(self._upcasters), to_line(seq, event))
+                t = float(event.t) + 0.0  # SQLite knows no -0.0
+                row = (seq, t, event.type, current(self._upcasters), to_line(seq, event))
                 hash = _link(hash, row)
                 rows.append((*row, hash))
             text = _as_json(answer)
@@ -162,9 +164,12 @@ class SqliteJournal:
 
     def _answer(self, id: str) -> Answer | None:
         with self._asking():
-            found = self._db.execute(
-                "SELECT first, count, answer FROM commands WHERE id = ?", (id,)
-            ).fetchone()
+            try:
+                found = self._db.execute(
+                    "SELECT first, count, answer FROM commands WHERE id = ?", (id,)
+                ).fetchone()
+            except UnicodeEncodeError:
+                raise BadInput("the id is no text", field="id", remedy="use plain text") from None
         if found is None:
             return None
         first, count, answer = found
@@ -180,9 +185,6 @@ class SqliteJournal:
     def close(self) -> None:
         """Let go of the journal."""
         with self._lock:
-            with suppress(sqlite3.Error):  # somebody reads it: then it is left as after a crash
-                self._db.execute("PRAGMA busy_timeout = 0")
-                self._db.execute("PRAGMA journal_mode = DELETE")
             self._db.close()
             self._owned.close()
 
@@ -205,7 +207,7 @@ def read(path: str | Path, *, last: int | None = None, upcasters: Upcasters = UP
     """
     path = Path(path)
     _require(path)
-    with _reading(path) as db:
+    with _reading(path, "mode=ro") as db:
         origin, hash = _origin(db, path)
         _check(db, path, hash, upcasters, last)
         rows = db.execute(_ROWS, (0, _END if last is None else last))
@@ -231,6 +233,12 @@ def _begin(db: sqlite3.Connection, origin: Origin) -> None:
     db.execute(f"PRAGMA application_id = {APPLICATION}")
     db.execute(f"PRAGMA user_version = {SCHEMA}")
     db.execute("COMMIT")
+    db.execute("PRAGMA journal_mode = WAL")
+
+
+def _forbid(path: Path) -> None:
+    if path.exists():
+        raise BadInput("exists already", file=str(path), remedy="resume it or name another")
 
 
 def _sync_folder(folder: Path) -> None:
@@ -246,12 +254,14 @@ def _sync_folder(folder: Path) -> None:
 def _own(path: Path) -> sqlite3.Connection:
     """Keep every other process from owning a journal; the system lets go when this one ends."""
     # A file of its own: the journal itself stays open to readers.
-    db = _connect(Path(f"{path}.lock").absolute().as_uri())
+    db: sqlite3.Connection | None = None
     try:
+        db = _connect(Path(f"{path}.lock").absolute().as_uri())
         db.execute("PRAGMA busy_timeout = 0")
         db.execute("BEGIN EXCLUSIVE")
     except sqlite3.Error as error:
-        db.close()
+        if db is not None:
+            db.close()
         if error.sqlite_errorcode == sqlite3.SQLITE_BUSY:
             raise BadInput(
                 "is in use by another process",
@@ -259,9 +269,17 @@ def _own(path: Path) -> sqlite3.Connection:
                 remedy="stop the server that runs this mission first",
             ) from None
         raise BadInput(
-            f"cannot be locked ({error})", file=str(path), remedy="check the folder's rights"
+            f"cannot be locked ({error})", file=str(path), remedy="check the folder and its rights"
         ) from None
     return db
+
+
+def _alone(path: Path) -> str:
+    """Return how SQLite reads a file that nobody writes: without a trace, if nothing is left over.
+
+    After a crash the file alone need not be whole; SQLite then reads what stands beside it.
+    """
+    return "mode=ro" if Path(f"{path}-wal").exists() else "immutable=1"
 
 
 def _require(path: Path) -> None:
@@ -269,7 +287,7 @@ def _require(path: Path) -> None:
     if not path.is_file():
         raise BadInput("no such file", file=str(path), remedy="check the path")
     try:
-        with closing(_connect(f"{path.absolute().as_uri()}?immutable=1")) as db:
+        with closing(_connect(f"{path.absolute().as_uri()}?{_alone(path)}")) as db:
             (application,) = db.execute("PRAGMA application_id").fetchone()
             (schema,) = db.execute("PRAGMA user_version").fetchone()
     except sqlite3.Error as error:
@@ -287,10 +305,10 @@ def _require(path: Path) -> None:
 
 
 @contextmanager
-def _reading(path: Path) -> Iterator[sqlite3.Connection]:
+def _reading(path: Path, how: str) -> Iterator[sqlite3.Connection]:
     """Open a journal so that nothing can be changed."""
     try:
-        db = _connect(f"{path.absolute().as_uri()}?mode=ro")
+        db = _connect(f"{path.absolute().as_uri()}?{how}")
         with closing(db):
             db.execute("BEGIN")  # what others append meanwhile is not seen
             yield db
@@ -313,9 +331,7 @@ def _writing(path: Path) -> sqlite3.Connection:
         raise BadInput(
             f"cannot be written ({error})",
             file=str(path),
-            remedy="try again when nobody reads it"
-            if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_BUSY
-            else "check its rights; keep it on a local disk",
+            remedy="check its rights; keep it on a local disk",
         ) from None
     return db
 
