@@ -36,8 +36,8 @@ def preview(
     BadInput
         If one of the commands is not possible.
     """
-    before = _lengths(live, under_way)
     with Trial(live) as trial:
+        before = _lengths(live, under_way)
         events = trial.admit(commands).events
         after = trial.live
         if all(isinstance(event, ObstacleAdded | ObstacleRemoved) for event in events[1::2]):

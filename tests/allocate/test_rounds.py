@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from problems import line, problems
 
-from oath.allocate import WAITING, Budget, Oath, Problem, checked, plan_all, urgent
+from oath.allocate import WAITING, Budget, ByPriority, Oath, Problem, checked, plan_all, urgent
+from oath.allocate.problem import Aboard
 from oath.model import Assignment, RouteStop
 
 
@@ -91,6 +94,20 @@ def test_urgent_tasks_say_why_they_cannot_be_done() -> None:
     answer = urgent(problem, [0])
     assert answer.routes == {"r0": ()}
     assert answer.unassigned == {"t0": "no robot can do type 'b'"}
+
+
+@pytest.mark.parametrize(("priority", "shares"), [([1, 0], [6.0]), ([0, -1], [3.0, 3.0])])
+def test_priorities_share_the_time_there_is(priority: list[int], shares: list[float]) -> None:
+    asked = []
+
+    class Spy(Oath):
+        def allocate(self, problem: Problem, budget: Budget, rng: Any) -> Assignment:
+            asked.append(budget.seconds)
+            return super().allocate(problem, budget, rng)
+
+    problem = replace(line([0.0], [(1, 2), (3, 4)], capacity=2), priority=np.array(priority))
+    ByPriority(Spy()).allocate(problem, Budget(seconds=6.0), np.random.default_rng(0))
+    assert asked == shares
 
 
 @settings(max_examples=60, deadline=None)

@@ -153,6 +153,15 @@ def leaves_what_it_served(make: Make) -> None:
         assert [stop.t for stop in of(StopServed, drain(fleet), "slow")] == [6.0]
 
 
+def works_on_when_told_to_again(make: Make) -> None:
+    fleet = make(two())
+    fleet.send("slow", order((1, 2), service=5.0))  # there at 2 s
+    fleet.send("fast", order((6, 9), task="b"))
+    wait_for(Moved, fleet, "slow")
+    fleet.send("slow", order(service=5.0))
+    assert [stop.t for stop in of(StopServed, drain(fleet), "slow")] == [7.0]
+
+
 def turns_after_it_was_stopped(make: Make) -> None:
     fleet = until_fast_moved(make)
     at = fleet.cancel("slow", at_once=True)
@@ -212,6 +221,7 @@ CONTRACT = [
     stops_at_once_in_the_middle,
     finishes_its_move_when_told_softly,
     leaves_what_it_served,
+    works_on_when_told_to_again,
     turns_after_it_was_stopped,
     takes_a_new_path_after_its_current_move,
     cancel_of_an_idle_robot_changes_nothing,

@@ -32,6 +32,8 @@ class ByPriority:
     def allocate(self, problem: Problem, budget: Budget, rng: np.random.Generator) -> Assignment:
         """Give routes to robots, see `Allocator`."""
         rest = problem
+        if budget.seconds is not None and (problem.priority < 0).any():
+            budget = replace(budget, seconds=budget.seconds / 2)  # what is low is asked for apart
         proof = Assignment(routes={}, unassigned={})
         alone = len(set(problem.priority.tolist())) == 1
         for lowest in (1, 0, -1):

@@ -328,15 +328,24 @@ class Roadmap:
         look = 4 * self.params.links
         nodes = self.nodes()
         while True:
-            near = self.graph.nearest(at[0], at[1], look)
-            if self._gone:
-                near = near[[node not in self._gone for node in near.tolist()]]
+            near = self._nearest(at, look)
             a = np.repeat(at[None], len(near), axis=0)
             free = workspace.core.free(a, nodes[near], mode.radius, blocked).astype(np.bool_)
             seen = np.asarray(near[free], dtype=np.intp)
             if len(seen) or look >= min(self.graph.size, 4096):
                 return seen[: self.params.links]
             look *= 4
+
+    def _nearest(self, at: Array, count: int) -> NDArray[np.int32]:
+        """The nodes nearest to a point, but those that were only tried out."""
+        more = count
+        while True:
+            near = self.graph.nearest(at[0], at[1], more)
+            if self._gone:
+                near = near[[node not in self._gone for node in near.tolist()]]
+            if len(near) >= count or more >= self.graph.size:
+                return near[:count]
+            more *= 2
 
     def _sights(self, points: Array, nodes: NDArray[np.intp]) -> NDArray[np.int64]:
         """Pairs (m, 2) of each point's node and the corner nodes nearest to it."""
