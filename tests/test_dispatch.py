@@ -294,6 +294,124 @@ def test_a_command_itself_only_moves_the_clock() -> None:
     assert pure(state(), event) == (state(t=5.0), ())
 
 
+def busy(robot: str = "r1", *stops: str, **changes: Any) -> State:
+    one = RobotState(position=(1, 1), route=route(*stops), **changes)
+    return state(robots={"r1": idle(), "r2": idle()} | {robot: one})
+
+
+def test_a_new_task_and_a_new_priority_ask_for_a_round() -> None:
+    task = visit("n", (3, 3))
+    after, actions = pure(state(), ev.TaskAdded(t=1.0, task=task))
+    assert actions == (Allocate(),)
+    assert after.tasks["n"] == task and "n" in after.labels and after.changes == 1
+    event = ev.PriorityChanged(t=2.0, task="a", priority="high")
+    after, actions = pure(state(), event)
+    assert actions == (Allocate(),)
+    assert after.urgent() == ("a",)
+
+
+def test_a_cancelled_task_leaves_every_route_and_its_robot_turns_only_if_it_was_next() -> None:
+    next_one, actions = pure(busy("r1", "c", "+a", "-a"), ev.TaskCancelled(t=1.0, task="c"))
+    assert next_one.robots["r1"].route == route("+a", "-a")
+    assert actions == (Plan("r1", "command"), Allocate())
+    later, actions = pure(busy("r1", "c", "+a", "-a"), ev.TaskCancelled(t=1.0, task="a"))
+    assert later.robots["r1"].route == route("c") and later.robots["r1"].stale
+    assert actions == (Allocate(),)
+    assert "a" not in later.tasks
+
+
+def test_what_is_cancelled_aboard_stays_and_pickups_that_counted_on_its_room_go_back() -> None:
+    before = busy("r1", "-a", "+b", "-b", carrying=("a",))
+    after, actions = pure(before, ev.TaskCancelled(t=1.0, task="a"))
+    assert after.robots["r1"].carrying == ("a",) and after.robots["r1"].route == ()
+    assert after.carrier("a") == "r1" and after.deliverable("r1") == ()
+    assert actions == (Plan("r1", "command"), Allocate())
+    check_partition(after)
+
+
+def test_a_failed_robot_strands_what_it_carries_until_that_comes_back_as_it_does() -> None:
+    before = busy("r1", "-a", "c", carrying=("a",))
+    events = failure(before, "r1", (4, 4))
+    assert [event.type for event in events] == ["robot_failed", "task_cancelled", "task_added"]
+    stranded, actions = pure(before, events[0])
+    assert stranded.stranded == {"a": "carried by r1, which failed"}
+    assert actions == (Plan("r1", "command"), Allocate())
+    after = stranded
+    for event in events[1:]:
+        after, actions = pure(after, event)
+        check_partition(after)
+        assert actions == ()  # the round that was asked for has yet to answer
+    assert after.robots["r1"] == RobotState(position=(1, 1))
+    assert after.tasks["a"].stops[0].at == (4, 4)
+    assert after.waiting() == ("b", "c", "a")
+    # One answer that knows of all this is enough, an older one is not.
+    answer = allocated({"r1": (), "r2": ()}, round=after.rounds)
+    assert pure(after, answer)[1] == (Finish(),)
+    assert pure(after, replace(answer, round=after.rounds - 1))[1] == (Allocate(),)
+
+
+def test_a_paused_robot_keeps_its_route_and_only_what_is_urgent_asks_for_a_round() -> None:
+    event = ev.RobotPaused(t=1.0, robot="r1")
+    after, actions = pure(busy("r1", "c"), event)
+    assert actions == () and after.robots["r1"].route == route("c")
+    assert after.unserved()["c"] == "given to r1, which is paused"
+    assert after.unserved()["a"] == "waits for a robot (paused: r1)"
+    high = replace(state().tasks["c"], priority="high")
+    before = replace(busy("r1", "c"), tasks={**state().tasks, "c": high})
+    assert pure(before, event)[1] == (Allocate(),)
+    # It is planned for, but does not drive.
+    assert pure(after, planned("r1"))[1] == ()
+    resumed, actions = pure(after, ev.RobotResumed(t=2.0, robot="r1"))
+    assert actions == (Plan("r1", "command"), Allocate())
+    assert resumed.paused == frozenset()
+
+
+def test_a_late_answer_gives_a_paused_robot_nothing_new_and_nobody_what_was_cancelled() -> None:
+    on = replace(busy("r1", "c"), rounds=1, allocating=True)
+    held, _ = pure(on, ev.RobotPaused(t=1.0, robot="r1"))
+    gone, _ = pure(held, ev.TaskCancelled(t=1.0, task="b"))
+    late = allocated({"r1": route("c", "+a", "-a"), "r2": route("+b", "-b")})
+    after, _ = pure(gone, late)
+    assert after.robots["r1"].route == route("c")
+    assert after.robots["r2"].route == ()
+
+
+def test_an_obstacle_that_goes_asks_for_shorter_ways_and_another_round() -> None:
+    wall = ev.ObstacleAdded(t=1.0, obstacle="w", kind="wall", polygon=DOOR)
+    there, actions = pure(busy("r1", "c"), wall)
+    assert actions == (UpdateMap("w"), Repair("r1", "w"), Repair("r2", "w"))
+    there = replace(there, refused=frozenset({("r2", "a")}))
+    gone, actions = pure(there, ev.ObstacleRemoved(t=2.0, obstacle="w"))
+    assert actions == (UpdateMap("w"), Plan("r1", "command"), Allocate())
+    assert gone.obstacles == {} and gone.refused == frozenset() and "w" in gone.obstacle_ids
+
+
+@pytest.mark.parametrize(("length", "asks"), [(10.4, False), (10.6, True)])
+def test_only_a_way_that_grew_enough_is_reconsidered(length: float, asks: bool) -> None:
+    before = replace(busy("r1", "c", left=10.0), reconsiders=True)
+    actions = pure(before, planned("r1", length, reason="obstacle"))[1]
+    assert actions == ((Drive("r1"), Allocate()) if asks else (Drive("r1"),))
+    assert pure(replace(before, reconsiders=False), planned("r1", length, reason="obstacle"))[
+        1
+    ] == (Drive("r1"),)
+
+
+def test_every_command_is_kept_with_what_takes_it_back_until_it_is_taken_back() -> None:
+    told = ev.Commanded(t=0.0, command={"intent": "some"}, source="test")
+    undo = ev.Commanded(t=0.0, command={"intent": "undo"}, source="test")
+    now = state()
+    for event in (told, ev.RobotPaused(t=1.0, robot="r1"), ev.RobotPaused(t=1.0, robot="r2")):
+        now, _ = pure(now, event)
+    now, _ = pure(now, told)
+    now, _ = pure(now, ev.RobotFailed(t=2.0, robot="r1"))
+    now, _ = pure(now, ev.TaskCancelled(t=2.0, task="a"))  # what follows is not recorded
+    resumed = [ev.RobotResumed(t=1.0, robot=robot) for robot in ("r2", "r1")]
+    assert now.undo == (tuple(resumed), ())
+    now, _ = pure(now, undo)
+    now, _ = pure(now, ev.TaskCancelled(t=2.0, task="b"))
+    assert now.undo == (tuple(resumed),)
+
+
 def test_the_clock_never_goes_back() -> None:
     assert pure(state(t=9.0), started(2.0))[0].t == 9.0
 

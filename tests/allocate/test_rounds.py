@@ -89,6 +89,41 @@ def test_an_urgent_task_goes_to_who_completes_it_soonest() -> None:
     assert answer.routes["r0"] == () and answer.unassigned == {}
 
 
+def loaded(problem: Problem, *loads: list[int]) -> Problem:
+    """Return the problem with loads aboard, given by where they go."""
+    aboard = tuple(
+        tuple(
+            Aboard(task=f"l{r}{i}", delivery=int(problem.delivery[to]), service_time=0.0)
+            for i, to in enumerate(load)
+        )
+        for r, load in enumerate(loads)
+    )
+    return replace(problem, aboard=aboard, load=np.array([len(a) for a in aboard], dtype=np.int32))
+
+
+def test_a_full_robot_unloads_first_what_lets_it_begin_soonest() -> None:
+    problem = loaded(line([0.0], [(5, 6), (9, 9), (2, 2)], capacity=2), [1, 2])
+    answer = urgent(problem, [0])
+    assert [(stop.task, stop.stop) for stop in answer.routes["r0"]] == [
+        ("l01", "delivery"),
+        ("t0", "pickup"),
+        ("t0", "delivery"),
+    ]
+
+
+def test_a_free_robot_goes_where_a_full_one_would_be_later() -> None:
+    problem = loaded(line([4.0, 0.0], [(5, 6), (9, 9)], capacity=1), [1], [])
+    assert urgent(problem, [0]).routes["r0"] == ()
+
+
+def test_of_equally_soon_robots_the_holder_keeps_an_urgent_task() -> None:
+    problem = line([0.0, 10.0], [(5, 6)])
+    assert urgent(problem, [0]).routes["r1"] == ()
+    mine = (RouteStop(task="t0", stop="pickup"), RouteStop(task="t0", stop="delivery"))
+    held = replace(problem, previous=((), mine))
+    assert urgent(held, [0]).routes == {"r0": (), "r1": mine}
+
+
 def test_urgent_tasks_say_why_they_cannot_be_done() -> None:
     problem = line([0.0], [(1, 2), (3, 4)], capability=[[1.0, 0.0]], types=[1, 0])
     answer = urgent(problem, [0])

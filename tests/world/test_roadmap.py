@@ -514,3 +514,62 @@ def test_missed_is_empty_when_all_hangs_together() -> None:
     parts = world.roadmap.components(0)
     assert len(set(parts[list(world.stops.values())].tolist())) == 1
     assert missed(world.roadmap, 0) == []
+
+
+# --- Trials
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_a_trial_leaves_no_trace_and_what_it_tried_can_be_done_after(seed: int) -> None:
+    """Costs, obstacles and components are as before; a real change then equals one untried."""
+    rng = np.random.default_rng(seed)
+    map = random_map(rng)
+    modes = (Mode(GROUND, 0.1), Mode(FLYER, 0.2))
+    tried, untried = (small_roadmap(map, modes=modes, seed=seed % 7) for _ in range(2))
+    spots = [random_point(rng) for _ in range(6)]
+    for roadmap in (tried, untried):
+        for at in spots:
+            roadmap.insert(at)
+    nodes = [tried.insert(at) for at in spots]
+    obstacle = random_obstacle(rng, "new", random_point(rng))
+    before = [tried.travel(mode, nodes, nodes) for mode in (0, 1)]
+    with tried.trial():
+        tried.add_obstacle(obstacle)
+        tried.insert(random_point(rng))
+        for id in list(tried.workspace.obstacles)[:1]:
+            tried.remove_obstacle(id)
+    assert tried.workspace.obstacles == untried.workspace.obstacles
+    for mode in (0, 1):
+        np.testing.assert_array_equal(tried.travel(mode, nodes, nodes), before[mode])
+        np.testing.assert_array_equal(
+            tried.components(mode)[nodes] == tried.components(mode)[nodes[0]],
+            untried.components(mode)[nodes] == untried.components(mode)[nodes[0]],
+        )
+    tried.add_obstacle(obstacle)
+    untried.add_obstacle(obstacle)
+    for mode in (0, 1):
+        got, wanted = (one.travel(mode, nodes, nodes) for one in (tried, untried))
+        np.testing.assert_array_equal(np.isfinite(got), np.isfinite(wanted))
+
+
+def test_nodes_that_were_only_tried_out_are_never_joined() -> None:
+    roadmap = small_roadmap(Map(bounds=BOX))
+    with roadmap.trial():
+        gone = roadmap.insert((4.0, 4.0))
+    node = roadmap.insert((4.0, 4.0))
+    assert node != gone
+    ends = roadmap.graph.ends()
+    assert gone not in ends[(ends == node).any(axis=1)]
+    assert roadmap.near((4.0, 4.0), 0) == (node,)
+
+
+def test_components_without_what_is_to_be_avoided() -> None:
+    lab = {"lab": ((3.0, -1.0), (5.0, -1.0), (5.0, 9.0), (3.0, 9.0))}
+    roadmap = small_roadmap(Map(bounds=BOX), zones=lab, relevant=frozenset({"lab"}))
+    nodes = [roadmap.insert(at) for at in ((1.0, 4.0), (7.0, 4.0))]
+    west, east = roadmap.components(0)[nodes]
+    assert west == east
+    west, east = roadmap.components(0, frozenset({"lab"}))[nodes]
+    assert west != east
+    assert roadmap.near((2.9, 4.1), 0, frozenset({"lab"}))
