@@ -137,7 +137,10 @@ class _Server:
         self._loop = asyncio.get_running_loop()
         for sign in (signal.SIGINT, signal.SIGTERM):
             self._loop.add_signal_handler(sign, self._stop)
+        gc.disable()  # nothing that is read at the start is garbage
         await asyncio.to_thread(self._owner.open)
+        gc.freeze()
+        gc.enable()
         try:
             metrics = Metrics()
             talks = Talks(self._owner, self._running.interpreter)
@@ -156,7 +159,6 @@ class _Server:
                 timeout_graceful_shutdown=3,
                 timeout_keep_alive=30,
             )
-            gc.freeze()  # what is there now stays: looking through it again and again takes time
             self._uvicorn = _Uvicorn(config)
             self._uvicorn.should_exit = self._stopping
             on_ready()
