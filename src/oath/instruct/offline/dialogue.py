@@ -88,10 +88,13 @@ def _again(heard: Heard, draft: Draft) -> Reply:
 def _anew(heard: Heard, draft: Draft) -> bool:
     """Whether words are an instruction of their own and no answer."""
     words = [one for one in heard.tokens if one.kind == "word"]
-    if len(words) < 2 and not (words and words[0].text in _ALONE):
+    told = {"robot", "label", "obstacle"} & {one.kind for one in heard.tokens}
+    if len(words) < 2 and not (words and (words[0].text in _ALONE or told)):
         return False
     meant = meaning(heard)
-    if meant.share < 0.7:
+    if meant.share < (0.7 if len(words) > 1 else 0.9):
+        return False
+    if len(words) == 1 and (words[0].text in _NOUNS or _CORRECTS.search(heard.line)):
         return False
     kinds = {one.kind.removeprefix("unknown_") for one in heard.tokens}
     names = meant.intent not in NEEDS or bool(NEEDS[meant.intent] & kinds)
@@ -179,10 +182,10 @@ def _fill_task(heard: Heard, draft: Draft, filled: Filled) -> None:
     filled.parameters |= extra.parameters
     words = [one for one in heard.tokens if one.kind not in ("mark",)]
     bare = len(words) == 1 and words[0].kind in ("word", "unknown_label")
-    asked = "task_label" in draft.missing or not draft.missing
+    asked = "task_label" in draft.missing
+    asked = asked or (bare and not draft.missing and words[0].text not in heard.models.words)
     if bare and asked and not extra.parameters and re.fullmatch(r"\w[\w.-]{0,31}", words[0].raw):
-        if "task_label" in draft.missing or words[0].text not in heard.models.words:
-            filled.parameters["task_label"] = words[0].raw
+        filled.parameters["task_label"] = words[0].raw
     spots = [n for n, one in enumerate(heard.tokens) if one.kind in _SPOTS]
     if len(spots) > 2:
         filled.object_to("Which is where it is picked up, and which where it goes?")

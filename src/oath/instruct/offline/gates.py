@@ -41,7 +41,7 @@ _VERB = (
 
 _NOT = re.compile(
     rf"\b(do|please|never|should|must|would|need|to|can|could|may|shall"
-    rf"|will) not (?:\w+ )?{_VERB}\b"
+    rf"|will) not (?:\w+ ){{0,2}}{_VERB}\b"
     rf"|\b(never|not|rather not|refrain from|avoid|instead of|without"
     rf"|stop) (?:to )?{_VERB}(?:ing|ting"
     rf"|ping|ning)?\b|\bno (?:need|reason|point|use|way)\b|\bby no means\b"
@@ -68,17 +68,19 @@ _NOT_AFTER_ALL = re.compile(
 )
 
 _ASKS = re.compile(
-    r"^(?:\W*(?:and|but|so|hey|hi|hello|ok|okay|well|um|sorry|please|now) )*(?:(?:is|are|was"
-    r"|were|does|did"
-    r"|has|had|why|who|whose|what|where|am)\b|how (?!about)|which (?!is\b)|when (?:is|are|was"
-    r"|will|do|does|did"
-    r"|can|should)\b|(?:do|have|should|shall|must|may|might) (?:you|we|i|they|it|he|she|the|a"
-    r"|any|robots"
-    r"|there|somebody|someone|anyone|<\w+>|this|that)\b)(?! (?:wait|stop|pause|continue|go|done"
-    r"|sit) )"
+    r"^(?:\W*(?:and|but|so|hey|hi|hello|ok|okay|well|um|sorry|please|now) )*"
+    r"(?:(?:is|are|was|were|does|did|has|had|why|who|whose|what|where|am)\b"
+    r"|how (?!about)|which (?!is\b)"
+    r"|when (?:is|are|was|will|do|does|did|can|should)\b"
+    r"|(?:do|have|should|shall|must|may|might) (?:you|we|i|they|it|he|she|the|a|any|robots|there"
+    r"|somebody|someone|anyone|this|that)\b"
+    r"|(?:should|shall|must|may|might)(?: the)? <\w+>)"
+    r"|^(?:can|could|would|will|might|may) <robot>(?!.*\bplease\b)(?! (?:stop|wait|hold|pause"
+    r"|continue|go|resume|proceed|stand|stay|halt|move|carry on|drive|start|freeze|be)\b)"
 )
 _ASKS_FOR = re.compile(
-    r"\b(can|could|would|will|may|might) (you|we|i|somebody|someone|<robot>|u|one|anybody|anyone)\b"
+    r"^(can|could|would|will) |\b(can|could|would|will|may|might) (you|we|i|somebody|someone"
+    r"|<robot>|u|one|anybody|anyone)\b"
     r"|\b(would|do) you mind\b|\bwhy (not|do not we|do not you)\b|\bhow about\b|\bmind (\w+ing)\b"
     r"|\bpossible to\b|\blet us\b|\bshall we\b|\bplease\b"
 )
@@ -91,14 +93,15 @@ _ASKS_ABOUT = re.compile(
 )
 
 _IF = re.compile(
-    r"\b(if|unless|until(?! further| i say)|till(?! further| i say)|(?<!at )once|whenever"
-    r"|in case|in the event|provided|assuming|suppose|supposing"
+    r"\b(if|unless|until(?! further| later| the end| last)|till(?! further| later| the end"
+    r"| last)|(?<!at )once|whenever"
+    r"|in case|in the event|provided|assuming|assume|suppose|supposing"
     r"|imagine|as long as|except|depending|otherwise|in order of|pending)\b"
-    r"|\b(when|after|while|as soon as|before)(?= (the |a |my |our )?(<\w+>|i|you|we|it|he|she"
+    r"|\b(when|after|while|as soon as|before)(?= (the |a |my |our )?(<\w+>|(?:i|you|we|it|he|she"
     r"|they|(?!\w+thing)\w+ing"
     r"|someone|people|lunch|dinner|breakfast|sunset|shift|\w+ (is|are|has|have|arrives?|comes?"
     r"|goes|leaves?"
-    r"|returns?|starts?|ends?|opens?|closes?))\b)"
+    r"|returns?|starts?|ends?|opens?|closes?))\b))"
 )
 _IF_POLITE = re.compile(
     r"\b(if|when|whenever|once|as soon as|as long as) (you|it is|it's|that is|at all|there is)?"
@@ -124,15 +127,16 @@ _TOLD_BY_ME = re.compile(r"\b(as )?i (said|told you|mentioned|already said)\b")
 
 _PAST = re.compile(
     r"\b(yesterday|last (week|night|month|time|year|monday|friday)|ago|earlier today|this morning"
-    r"|previously|used to|had been|formerly|back then|the other day|once upon|on monday"
+    r"|previously|used to|(?:we|i|they) had|had been|formerly|back then|the other day|once upon"
+    r"|on monday"
     r"|in the past)\b"
-    r"|\b(i|we|he|she|they|you|someone|somebody|tom|<robot>|shift|operator|colleague) (have "
+    r"|(?<!\w)(i|we|he|she|they|you|someone|somebody|tom|<robot>|shift|operator|colleague) (have "
     r"|has |had |"
     r"just |already |also )*(added|created|registered|cancelled|deleted|paused|stopped|resumed"
     r"|raised"
     r"|lowered|changed|released|prioritized|restarted|undid|undone|entered|logged|inserted|reverted"
     r"|halted|aborted|scheduled|bumped|delivered|finished|completed)\b"
-    r"|\b(task|job|order|<label>|priority|<robot>) (was|were|has been|had been|got"
+    r"|(?<!\w)(task|job|order|<label>|priority|<robot>) (was|were|has been|had been|got"
     r"|have been) (\w+ )?"
     r"(added|created|registered|cancelled|deleted|paused|stopped|resumed|raised|lowered|changed"
     r"|done"
@@ -199,6 +203,10 @@ _UNITS = re.compile(
 )
 
 
+_NO_OTHER = re.compile(r"\b(nothing|no|none)( \w+){1,6} (than|as) <label>")
+"""Says that one comes before all others."""
+
+
 def refused(line: str) -> str | None:
     """Why an instruction is not read at all: it talks to the machine, not of the mission."""
     if _REFUSED.search(line):
@@ -216,17 +224,20 @@ def refused(line: str) -> str | None:
 
 def not_meant(line: str, intent: str) -> str | None:
     """Why words are no instruction although they sound like one; None if they may be one."""
+    line = _NO_OTHER.sub(" ", line)
     if intent == "undo":
-        if re.search(r"\b(not|never) (\w+ )?(undo|revert|reverse|take|roll|go|change)\b", line):
+        if re.search(r"\b(not|never) (\w+ ){0,2}(undo|revert|reverse|take|roll|go|change)\b", line):
             return "You say what not to do, so I change nothing."
+        if _IF.search(_IF_POLITE.sub(" ", line)):
+            return "I cannot wait for a condition, so I change nothing yet."
     elif intent != "query_status":
         asks = line.rstrip().endswith("?") and not _ASKS_FOR.search(line)
-        if intent == "robot_failed":
-            asks = asks or bool(re.match(r"(can|could|would|will|might|may) (?!not)", line))
         if _ASKS_ABOUT.search(line) or _ASKS.search(line) or asks:
             return "That sounds like a question, so I change nothing."
         if _is_denied(line, intent):
             return "You say what not to do, so I change nothing."
+        if intent == "pause_robot":
+            line = re.sub(r"\b(un)?till? (i|we|you) \w+( so| otherwise)?[ .!]*$", " ", line)
         if _IF.search(_IF_POLITE.sub(" ", line)):
             return "I cannot wait for a condition, so I change nothing yet."
         if _TOLD.search(_TOLD_BY_ME.sub(" ", line)):
@@ -280,6 +291,7 @@ def doubtful(line: str, intent: str) -> str | None:
         return "You sound unsure, so I ask before I propose anything."
     if intent != "query_status" and _OR.search(line):
         return "That leaves open which one is meant. Name exactly one."
+    line = _NO_OTHER.sub(" ", line)
     if intent in ("change_task_priority", "cancel_task") and _COMPARES.search(line):
         return (
             "I cannot order two tasks against each other; I can make a task high, normal or low "
@@ -289,11 +301,13 @@ def doubtful(line: str, intent: str) -> str | None:
 
 
 _AGAINST = {
-    "obstacle_update": r"\b(remove\w*|delete|erase|reopen\w*|unblock\w*|get rid|gone|cleared|free|lift|open|again|"
+    "obstacle_update": r"\b(remove\w*|delete|erase|reopen\w*|unblock\w*|get rid|gone|cleared|free"
+    r"|lift|open|again|"
     r"disappeared|unmark|no (longer|more) (a |an |any )?(<kind>|obstacle|there|blocked|closed)"
-    r"|passable again|clear"
-    r"(?! of))\b",
-    "robot_failed": r"\b(repair(ed)?|fix(ed)?|alive|fine|ok|okay|recovered|works|working well|is working|charge|again|back|reboot)\b(?! and)",
+    r"|passable again|clear(?! of))\b",
+    "robot_failed": r"\b(repair(ed)?|fix(ed)?|alive|fine|ok|okay|recovered|works|working well"
+    r"|is working"
+    r"|charge|again|back|reboot)\b(?! and)",
     "resume_robot": r"(?<!off )(?<!the )\b(stop|pause|hold|halt|wait|freeze)$",
     "cancel_task": r"\b(not|never) (\w+ )?(forget|miss|lose)\b",
     "add_task": r"\b(cancel|delete|remove|abort|undo|wall|obstacle|blocked)\b",
@@ -350,6 +364,9 @@ def is_vague(tokens: Sequence[Token], at: int) -> bool:
     before = re.sub(r"[\[(, ]+$", "", before)
     if tokens[at].kind == "point":
         before = re.sub(r"\bbetween( the)?( points?| coordinates?)?$", "", before.strip())
+        before = re.sub(
+            r"\b(\w+ed by|(go|get|gets|getting|pass) past( from)?|past from)$", "", before
+        )
         before = re.sub(r"\b(side|corner|end|entrance|middle|edge|door)s? at$", "", before)
     return bool(
         _VAGUE.search(before.strip()) or _VAGUE_AFTER.search(as_line(tokens[at + 1 : at + 5]))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from io import BytesIO
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -87,7 +88,7 @@ def features(tokens: Sequence[Token], concepts: Concepts) -> set[str]:
     """Words, neighbours, pieces of words, and what words have in common with others."""
     seen = ["^", *shapes(tokens), "$"]
     found = set(seen[1:-1])
-    found |= {f"{a} {b}" for a, b in zip(seen, seen[1:], strict=False)}
+    found |= {f"{a} {b}" for a, b in pairwise(seen)}
     found |= {f"{a} _ {b}" for a, b in zip(seen, seen[2:], strict=False)}
     groups = [concepts.get(stem(one), ()) if one[0] != "<" else (one,) for one in seen]
     for n, group in enumerate(groups):
@@ -206,10 +207,3 @@ def _linear(arrays: Mapping[str, NDArray[Any]], name: str) -> Linear:
 
 def _text(array: NDArray[Any]) -> list[str]:
     return array.tobytes().decode().split("\n")
-
-
-def windows(tokens: Sequence[Token]) -> Iterator[int]:
-    """Indices of the places and points."""
-    for n, token in enumerate(tokens):
-        if token.kind in ("point", "place", "unknown_place"):
-            yield n

@@ -247,10 +247,8 @@ def _name(
             return None
         if kind == "place" and last not in _BEFORE_PLACE | NOUNS["place"]:
             return None
-    if kind == "label" and key(name) != name.casefold() and wanted != name.casefold():
-        # A label is what was said, exactly; only case and punctuation marks inside may differ.
-        if raw.casefold().replace(" ", "") != name.casefold():
-            return None
+    if kind == "label" and raw.casefold().replace(" ", "") != name.casefold():
+        return None  # a label is said exactly
     quoted = any(one.quoted for one in part)
     return Token(kind, raw.casefold(), name, raw, quoted)
 
@@ -321,12 +319,16 @@ def _all_robots(tokens: Sequence[Token]) -> list[Token]:
             part_of = (
                 said[:4] == "the " and at > 0 and done[at - 1].text in ("from", "of", "to", "in")
             )
-            if plain and not part_of and ALL_ROBOTS.fullmatch(said):
+            others = at > 0 and done[at - 1].text in _BEFORE_OTHERS
+            others = others or (at + size < len(done) and done[at + size].text == "else")
+            if plain and not part_of and not others and ALL_ROBOTS.fullmatch(said):
                 done[at : at + size] = [Token("robot", said, "all", said)]
                 break
         at += 1
     return done
 
+
+_BEFORE_OTHERS = {"before", "after", "over", "than", "above", "of", "but", "except", "outranks"}
 
 _LABEL = re.compile(r"[a-z]{1,3}\d{0,3}|[a-z]+[-_]?\d{1,4}")
 _LETTER = re.compile(r"[a-z]\d{0,2}|[a-z]{1,2}\d{1,2}")
@@ -350,9 +352,9 @@ def _told(token: Token, last: Token | None, after: Sequence[Token], names: Names
     if token.kind != "word":
         return token
     word = token.text
-    if last is not None and last.text in NOUNS["place"] - {"delivery"} and token.raw in ("A", "I"):
-        if not after or after[0].kind == "mark" or after[0].text in ("and", "as", "with", "to"):
-            return Token("unknown_place", word, None, token.raw)
+    ends = not after or after[0].kind == "mark" or after[0].text in ("and", "as", "with", "to")
+    if last is not None and last.text in NOUNS["place"] and token.raw in ("A", "I") and ends:
+        return Token("unknown_place", word, None, token.raw)
     if _everyday(token, names) and not token.quoted:
         return token
     before = last.text if last is not None and last.kind == "word" and not last.quoted else ""
@@ -367,7 +369,7 @@ def _told(token: Token, last: Token | None, after: Sequence[Token], names: Names
         return Token("unknown_robot", word, None, token.raw)
     if re.fullmatch(r"(?:obstacle|\w{3,})[-_]\d+", word) and _single(word[:-2]) in names.kinds:
         return Token("unknown_obstacle", word, None, token.raw)
-    if before in NOUNS["label"] - {"delivery"} and _LABEL.fullmatch(word):
+    if before in (NOUNS["label"] | _VERBS) - {"delivery"} and _LABEL.fullmatch(word):
         return Token("unknown_label", word, None, token.raw)
     return token
 

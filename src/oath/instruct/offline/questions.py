@@ -25,7 +25,7 @@ def outside(heard: Heard, at: Point) -> str | None:
 def unknown_place(heard: Heard, token: Token) -> str:
     """There is no such place, but these."""
     known = ", ".join(heard.live.scene.mission.places) or "(none)"
-    return f"There is no place '{token.raw}'. Known places: {known}; a point such as (5, 19.5) will do."
+    return f"There is no place '{token.raw}'. Places: {known}; or a point such as (5, 19.5)."
 
 
 def open_tasks(live: Live) -> list[str]:
@@ -82,15 +82,15 @@ def ask_robot(heard: Heard) -> str:
 
 def ask(heard: Heard, missing: Sequence[str]) -> str:
     """Ask for parameters."""
-    questions = {
-        "location": ask_location,
-        "delivery_point": ask_delivery,
-        "obstacle_location": lambda _: ask_extent(),
-        "task_label": ask_label,
-        "obstacle": ask_obstacle,
-        "robot": ask_robot,
-        "priority": lambda _: "Which priority: low, normal or high?",
-        "task_type": lambda h: f"Which type? {', '.join(h.live.scene.mission.task_types)}",
-        "obstacle_type": lambda _: "Which kind is it, e.g. wall?",
+    questions: dict[str, str] = {
+        "location": ask_location(heard),
+        "delivery_point": ask_delivery(heard),
+        "obstacle_location": ask_extent(),
+        "task_label": ask_label(heard),
+        "obstacle": ask_obstacle(heard),
+        "robot": ask_robot(heard),
+        "priority": "Which priority: low, normal or high?",
+        "task_type": f"Which type? {', '.join(heard.live.scene.mission.task_types)}",
+        "obstacle_type": "Which kind is it, e.g. wall?",
     }
-    return " ".join(questions[one](heard) for one in missing)
+    return " ".join(questions[one] for one in missing)

@@ -36,6 +36,9 @@ def read_task(heard: Heard, filled: Filled) -> None:
         filled.parameters["task_label"] = labels[0].value
     elif labels:
         filled.several = [str(one.value) for one in labels]
+    elif (odd := _like_a_label(heard)) and not unknown:
+        why = f"There is no task '{odd.raw}'. {questions.ask_label(heard)}"
+        filled.object_to(why, "task_label")
     elif not unknown:
         _task_at(heard, filled)
     if not filled.trouble and re.search(
@@ -48,6 +51,15 @@ def read_task(heard: Heard, filled: Filled) -> None:
         ),
     ):
         filled.object_to("I change one task at a time. " + questions.ask_label(heard), "task_label")
+
+
+def _like_a_label(heard: Heard) -> Token | None:
+    """A word that can only be meant as a label."""
+    for token in heard.tokens:
+        strange = token.kind == "word" and token.text not in heard.models.words
+        if strange and re.fullmatch(r"[a-z]{2,3}|[a-z]{1,6}[-_]?\d{1,4}", token.text):
+            return token
+    return None
 
 
 def _task_at(heard: Heard, filled: Filled) -> None:
@@ -122,8 +134,8 @@ def _obstacle_to_add(heard: Heard, filled: Filled) -> None:
             "obstacle_location",
         )
     elif vague is not None:
-        filled.object_to(f"Where exactly? '{vague.raw}' says only roughly. {questions.ask_extent()}",
-                         "obstacle_location")  # fmt: skip
+        why = f"Where exactly? '{vague.raw}' says only roughly. {questions.ask_extent()}"
+        filled.object_to(why, "obstacle_location")
         return
     add_points(heard, filled, points)
 

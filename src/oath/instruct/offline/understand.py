@@ -17,6 +17,9 @@ from oath.instruct.offline.tokens import Token
 LIKELY = 0.5
 """How probable an intent must be to be acted on."""
 
+SURE_PRIORITY = 0.8
+"""How probable a change of priority must be for its wording alone to say which."""
+
 ABOUT = {
     "add_task": "add a task",
     "obstacle_update": "mark an obstacle",
@@ -66,7 +69,7 @@ def meaning(heard: Heard) -> Meant:
     other = shares.pop("other", 0.0)
     ranked = sorted(shares, key=lambda one: -shares[one])
     priority = max(priorities, key=lambda one: priorities[one])
-    sure = priorities[priority] >= 0.6 * sum(priorities.values())
+    sure = priorities[priority] >= 0.75 * sum(priorities.values())
     return Meant(ranked[0], priority if sure else None, shares[ranked[0]], ranked[1], other)
 
 
@@ -111,9 +114,10 @@ def _one(heard: Heard) -> Reply:
         return Reply(
             status="clarification",
             intent=meant.intent,
-            message=f"Shall I {ABOUT[meant.intent]} or {ABOUT[meant.second]}? Say it in other words.",
+            message=f"Shall I {ABOUT[meant.intent]} or {ABOUT[meant.second]}? Say it differently.",
         )
-    filled = slots.fill(meant.intent, heard, meant.priority)
+    told = meant.priority if meant.share >= SURE_PRIORITY else None
+    filled = slots.fill(meant.intent, heard, told)
     if meant.intent == "add_task" and "priority" not in filled.parameters:
         _read_its_priority(heard, filled)
     return answer(heard, meant.intent, filled, sure=meant.share)
@@ -223,7 +227,8 @@ def leftover(heard: Heard, intent: str) -> str | None:
         )
     odd, plain = gates.strange(heard.tokens, heard.models.words)
     if len(odd) >= 3 or (len(odd) == 2 and plain <= 4):
-        return f"I do not know the words {', '.join(repr(one) for one in odd[:4])}. Say it in other words."
+        shown = ", ".join(repr(one) for one in odd[:4])
+        return f"I do not know the words {shown}. Say it differently."
     return None
 
 
@@ -239,7 +244,7 @@ def commands_of(heard: Heard) -> list[Heard]:
     groups: list[list[Token]] = []
     for piece in pieces:
         if groups and _begins(heard, groups[-1], piece):
-            groups.append(list(piece))
+            groups.append([one for one in piece if one.text not in _LINKS])
         elif groups:
             groups[-1] += piece
         else:
@@ -271,6 +276,8 @@ def _begins(heard: Heard, before: Sequence[Token], piece: Sequence[Token]) -> bo
     """Whether a piece of an instruction is a command of its own, and so is what stands before."""
     if sum(one.kind == "word" and one.text not in _LINKS for one in piece) < 1:
         return False
+    while piece and piece[0].text in _LINKS:
+        piece = piece[1:]
     first, second = (meaning(replace(heard, tokens=tuple(one))) for one in (before, piece))
     if second.share < 0.75 or first.share < 0.6:
         return False
@@ -278,6 +285,8 @@ def _begins(heard: Heard, before: Sequence[Token], piece: Sequence[Token]) -> bo
         return False
     if first.intent != second.intent:
         return True
+    if first.intent == "change_task_priority":
+        return None not in (first.priority, second.priority) and first.priority != second.priority
     return first.intent == "add_task" and _whole(before) and _whole(piece)
 
 

@@ -82,21 +82,21 @@ def vocabulary(rows: list[Line], macros: Mapping[str, str]) -> frozenset[str]:
     return frozenset(word for word in words if len(word) > 1 or word in ("a", "i"))
 
 
-def utterances(seed: int = 0, each: int = 14) -> Iterator[Utterance]:
-    """Draw up to `each` utterances of every line."""
+def utterances(seed: int = 0, each: int = 14, world: Names | None = None) -> Iterator[Utterance]:
+    """Draw up to `each` utterances of every line, in sample worlds or in one."""
     rows, macros = lines()
     words = vocabulary(rows, macros)
-    worlds = [_world(names, words) for names in _WORLDS]
+    worlds = [world] if world is not None else [_world(names, words) for names in _WORLDS]
     rng = random.Random(seed)
     for row in rows:
         seen = set()
         for _ in range(each):
             pattern = _drawn(row.pattern, macros, rng)
-            world = rng.choice(worlds)
+            there = rng.choice(worlds)
             if pattern in seen:
                 continue
             seen.add(pattern)
-            yield _filled(row, pattern, world, rng)
+            yield _filled(row, pattern, there, rng)
 
 
 def _drawn(pattern: str, macros: Mapping[str, str], rng: random.Random) -> str:

@@ -1,0 +1,135 @@
+"""Tokens, numbers in words, points and names of the offline interpreter."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from oath.instruct.offline.names import Names, slip, tag
+from oath.instruct.offline.tokens import clean, lex, read_numbers, read_points
+
+WORLD = Names(
+    places={"b": "b", "c": "c", "kitchen": "kitchen", "packnorth": "pack-north"},
+    robots={"robot1": "robot1", "robot2": "robot2"},
+    labels={"bb": "bb", "be": "be", "12": "12"},
+    obstacles={"wall1": "wall-1"},
+    kinds={"wall": "wall", "bush": "bush"},
+    types={"normal": "normal", "special": "special"},
+    words=frozenset({"the", "should", "is"}),
+)
+
+
+def numbers(text: str) -> list[Any]:
+    return [one.value for one in read_numbers(lex(clean(text))) if one.kind == "number"]
+
+
+def points(text: str) -> list[Any]:
+    return [one.value for one in read_points(read_numbers(lex(clean(text)))) if one.kind == "point"]
+
+
+def kinds(text: str, kind: str) -> list[Any]:
+    return [one.value for one in tag(text, WORLD) if one.kind == kind]
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("five", [5]),
+        ("nineteen point five", [19.5]),
+        ("two point oh five", [2.05]),
+        ("three and a half", [3.5]),
+        ("minus two", [-2]),
+        ("-2.5", [-2.5]),
+        ("twenty-five", [25]),
+        ("one hundred and five", [105]),
+        ("four point twenty five", [4.25]),
+        ("zero point five", [0.5]),
+        ("5 point 5", [5.5]),
+        ("two point five three point five", [2.5, 3.5]),
+        ("this one", []),
+        ("1" * 400, [None]),
+    ],
+)
+def test_numbers(text: str, values: list[float | None]) -> None:
+    assert numbers(text) == values
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("(5, 19.5)", [(5, 19.5)]),
+        ("5 19.5", [(5, 19.5)]),
+        ("five and nineteen point five", [(5, 19.5)]),
+        ("one and one", [(1, 1)]),
+        ("x=4 y=7.5", [(4, 7.5)]),
+        ("y is 7, x is 4", [(4, 7)]),
+        ("x four y seven", [(4, 7)]),
+        ("[(3, 6), (4, 6), (4, 7)]", [(3, 6), (4, 6), (4, 7)]),
+        ("from 5 2 to 5 6", [(5, 2), (5, 6)]),
+        ("7 5, 8 5 and 8 4.8", [(7, 5), (8, 5), (8, 4.8)]),
+        ("5 m, 3 m", [(5, 3)]),
+        ("five", []),
+        ("(1, 2, 3)", []),
+        ("5, 6, 7", []),
+        ("2 by 3", []),
+        ("5-7", []),
+    ],
+)
+def test_points(text: str, found: list[tuple[float, float]]) -> None:
+    assert points(text) == found
+
+
+@given(st.integers(0, 99), st.integers(0, 99))
+def test_a_point_in_digits_is_read_as_it_is(x: int, y: int) -> None:
+    for form in (f"({x}, {y})", f"{x} {y}", f"x={x}, y={y}", f"[{x}; {y}]"):
+        assert points(form) == [(x, y)]
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "values"),
+    [
+        ("to point B", "place", ["b"]),
+        ("to B.", "place", ["b"]),
+        ("the Pack North", "place", ["pack-north"]),
+        ("the kitchn", "place", ["kitchen"]),
+        ("robot one and Robot 2", "robot", ["robot1", "robot2"]),
+        ("robots 1 and 2", "robot", ["robot1", "robot2"]),
+        ("r2", "robot", ["robot2"]),
+        ("robto1", "robot", ["robot1"]),
+        ("all the robots", "robot", ["all"]),
+        ("before everything else", "robot", []),
+        ('task "BB"', "label", ["bb"]),
+        ("bx", "label", []),
+        ("it should be done", "label", []),
+        ("cancel be", "label", ["be"]),
+        ("task be should be done", "label", ["be"]),
+        ("task 12", "label", ["12"]),
+        ("at 12 5", "label", []),
+        ("wall 1", "obstacle", ["wall-1"]),
+        ("two walls", "kind", ["wall"]),
+        ("a speical one", "type", ["special"]),
+        ("a normal task", "type", ["normal"]),
+        ("normal priority", "type", []),
+        ("point A", "unknown_place", [None]),
+        ("room F", "unknown_place", [None]),
+        ("robot9", "unknown_robot", [None]),
+        ("task zz", "unknown_label", [None]),
+    ],
+)
+def test_names(text: str, kind: str, values: list[str | None]) -> None:
+    assert kinds(text, kind) == values
+
+
+def test_digits_have_no_slips() -> None:
+    assert not slip("robot1", "robot2")
+    assert not slip("b", "c")
+    assert slip("kitchen", "kitchn") and slip("ktichen", "kitchen")
+
+
+@given(st.text(max_size=300))
+def test_any_text_has_tokens(text: str) -> None:
+    for token in tag(text, WORLD):
+        assert token.kind and isinstance(token.text, str)
