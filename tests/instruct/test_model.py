@@ -103,6 +103,18 @@ GOOD = [
         "There is a bush from (7, 5) to (8, 5)",
         ("obstacle_update", {"obstacle_location": [[7, 5], [8, 5]], "obstacle_type": "bush"}),
     ),
+    (
+        "there is a wall along y = 8 between x = 7 and x = 9",
+        ("obstacle_update", {"obstacle_location": [[7, 8], [9, 8]], "obstacle_type": "wall"}),
+    ),
+    (
+        "there is a box from (6, 5) to (7, 6)",
+        ("obstacle_update", {"obstacle_location": [[6, 5], [7, 5], [7, 6], [6, 6]]}),
+    ),
+    ("a task at y = 8, x = 2 for c", add(task_type="normal")),
+    ("bb can't wait any longer", ("change_task_priority", {"task_label": "bb"})),
+    ("aa is done, no? we don't need it, drop aa", ("cancel_task", {"task_label": "aa"})),
+    ("is robot1 idle?", ("query_status", {})),
     ("bb first, please", ("change_task_priority", {"task_label": "bb", "priority": "high"})),
     ("prioritise BB", ("change_task_priority", {"task_label": "bb"})),
     ("bb can wait", ("change_task_priority", {"task_label": "bb", "priority": "low"})),
@@ -155,6 +167,12 @@ MADE_UP = [
         ("obstacle_update", {"obstacle_location": [[7, 5], [8, 5], [8, 6]]}),
         ("obstacle_location",),
     ),
+    (
+        "a box from (6, 5) to (7, 6)",
+        ("obstacle_update", {"obstacle_location": [[6, 5], [7.5, 5], [7, 6], [6, 6]]}),
+        ("obstacle_location",),
+    ),
+    ("a task at y = 8, x = 2 for c", add((8, 2)), ("location",)),
 ]
 
 

@@ -18,6 +18,7 @@ from oath.errors import BadInput
 from oath.instruct import Dialogue, Draft, Reply
 from oath.instruct.model.grounding import (
     EVERY,
+    along_axes,
     name_said,
     number_said,
     numbers,
@@ -28,7 +29,11 @@ from oath.instruct.model.grounding import (
 from oath.instruct.model.prompt import REFUSALS
 from oath.model import Point, Priority
 
-_NOT = re.compile(r"\b(?:do not|don['’]?t|must not|mustn['’]?t|never)\b", re.IGNORECASE)
+_NOT = re.compile(
+    r"\b(?:do not|don['’]?t|must not|mustn['’]?t|never)\b"
+    r"(?! (?:bother|care|count|forget|mind|need|rely|wait|want|worry)\b)",
+    re.IGNORECASE,
+)
 """What turns an instruction round; a model that overlooks it would do the opposite."""
 
 MOST = 4
@@ -184,7 +189,9 @@ def _judge_one(
     ]
     kept = {name: value for name, value in parameters.items() if name not in unsaid}
     missing = [name for name, field in fields.items() if field.is_required() and name not in kept]
-    if missing or unsaid:
+    if missing or (
+        unsaid and not _made_up(intent, kept, {name: parameters[name] for name in unsaid}, live)
+    ):
         asked = tuple(dict.fromkeys([*missing, *unsaid]))
         return _ask(intent, kept, asked, live)
     try:
@@ -198,7 +205,9 @@ def _judge_one(
         intent, "priority", getattr(command, "priority", ""), said, known.get("priority")
     ):
         return _ask(intent, kept, ("priority",), live)
-    if acts or (intent in _CUES and draft is None and not _CUES[intent] & set(words(said))):
+    asks = intent == "query_status" and "?" in said
+    cued = asks or draft is not None or bool(_CUES.get(intent, frozenset()) & set(words(said)))
+    if acts or (intent in _CUES and not cued):
         example = _with_names(_PLAINLY[intent], live)
         return Reply(
             status="clarification",
@@ -206,6 +215,15 @@ def _judge_one(
         )
     # What was left open stays open: it is made up when the command is proposed.
     return filled.model_copy(update={name: None for name in fields if name not in _given(command)})
+
+
+def _made_up(intent: str, kept: dict[str, Any], others: dict[str, Any], live: Live) -> bool:
+    """Whether the other values are those that would be made up anyway."""
+    try:
+        filled = parse({"intent": intent, "parameters": kept}).filled(live)
+    except BadInput:
+        return False
+    return all(getattr(filled, name) == value for name, value in others.items())
 
 
 def _given(command: Command) -> set[str]:
@@ -225,17 +243,25 @@ def _said(intent: str, name: str, value: Any, said: str, known: Any) -> bool:
             return True
         kind = name in ("task_type", "obstacle_type")
         return name_said(value, said, plural=kind)
-    return _points_said(value, numbers(said), known)
+    return _points_said(value, said, known)
 
 
-def _points_said(value: Any, said: Sequence[float], known: Any) -> bool:
+def _points_said(value: Any, text: str, known: Any) -> bool:
     points, before = _points(value), _points(known) or []
     if points is None:
         return False
-    return all(
-        point in before or point_said(point, said) or _corrected(point, before, said)
+    said, (xs, ys) = numbers(text), along_axes(text)
+    found = [
+        point in before
+        or _corrected(point, before, said)
+        or (number_said(point[0], xs) and number_said(point[1], ys))
+        or (point_said(point, said) and not number_said(point[0], ys))
         for point in points
-    )
+    ]
+    if len(points) == 4 and (all(found[::2]) or all(found[1::2])):
+        # Two opposite corners say a rectangle.
+        return all(found) or len({x for x, _ in points}) == len({y for _, y in points}) == 2
+    return all(found)
 
 
 def _corrected(point: Point, before: Sequence[Point], said: Sequence[float]) -> bool:
@@ -299,6 +325,7 @@ def _left_out(said: str, commands: Sequence[Command], live: Live) -> str | None:
     """A number or a task type that was said and is in none of the commands."""
     used = list(_numbers_of([to_plain(command)["parameters"] for command in commands]))
     used.append(float(len(commands)))
+    used += [float(len(getattr(one, "obstacle_location", ()))) for one in commands]
     spare = list(numbers(said))
     for value in spare:
         if not number_said(value, used) and value != 1.0:

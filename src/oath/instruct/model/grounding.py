@@ -46,6 +46,8 @@ _LITTLE = frozenset(
 _NAMED = frozenset(words("called label named obstacle place point robot task"))
 """Words after which even a little word is a name."""
 
+_CANNOT_WAIT = re.compile(r"\b(?:can['’]?t|cannot|can not|won['’]?t) wait\b", re.IGNORECASE)
+
 EVERY = frozenset(words("all both each every everybody everyone everything"))
 
 _URGENCY: dict[Priority, frozenset[str]] = {
@@ -53,18 +55,23 @@ _URGENCY: dict[Priority, frozenset[str]] = {
         words(
             "high higher highest urgent urgently first top now asap immediate immediately "
             "important critical emergency rush hurry expedite prioritize prioritise priority "
-            "quickly soon sooner before next"
+            "quickly soon sooner before next once front ahead raise"
         )
     ),
     "normal": frozenset(words("normal normally usual ordinary regular medium default standard")),
     "low": frozenset(
         words(
             "low lower lowest last later least whenever unimportant deprioritize deprioritise "
-            "postpone defer wait less after"
+            "postpone defer wait less after end bottom back"
         )
     ),
 }
-_PLACING = frozenset(words("after before first last later least less next now soon wait"))
+_PLACING = frozenset(
+    words(
+        "after ahead back before bottom end first front last later least less next now once soon "
+        "top wait"
+    )
+)
 """Cues that a description of a new task may hold without saying how urgent it is."""
 
 
@@ -157,6 +164,21 @@ def point_said(at: Point, said: Sequence[float]) -> bool:
     return any(number_said(at[0], [x]) and number_said(at[1], [y]) for x, y in pairwise(said))
 
 
+def along_axes(text: str) -> tuple[list[float], list[float]]:
+    """The numbers that are said of x and of y, such as both ends of "x from 3 to 5, y = 2".
+
+    Examples
+    --------
+    >>> along_axes("along y = 8 between x = 7 and x = 9")
+    ([7.0, 9.0], [8.0])
+    """
+    found: dict[str, list[float]] = {"x": [], "y": []}
+    parts = re.split(r"(?<![^\W\d_])([xy])(?![^\W\d_])", text.casefold())
+    for axis, part in zip(parts[1::2], parts[2::2], strict=True):
+        found[axis] += numbers(part)
+    return found["x"], found["y"]
+
+
 def name_said(name: str, text: str, *, plural: bool = False) -> bool:
     """Whether a text says a name: whole, with or without case, gaps and spelt-out digits.
 
@@ -225,7 +247,7 @@ def priority_said(priority: Priority, usual: Priority, text: str) -> bool:
     >>> priority_said("high", "high", "put aa last"), priority_said("high", "high", "aa it is")
     (False, True)
     """
-    spoken = set(words(text))
+    spoken = set(words(_CANNOT_WAIT.sub("urgent", text)))
     said = {name for name, cues in _URGENCY.items() if cues & spoken}
     if priority in said:
         return True

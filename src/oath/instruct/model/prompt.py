@@ -48,7 +48,8 @@ Answer: {"verdict": ..., "about": ..., "commands": [{"intent": ..., "parameters"
 
 Rules:
 - Copy coordinates and names from operator_said (or from the draft). Never compute, guess or \
-complete a value. What was not said is null, also if only one name would be possible.
+complete a value; only a rectangle told by two opposite corners, or by ranges of x and y, is \
+written as its four corners. What was not said is null, also if only one name would be possible.
 - Names are those of the mission, spelt as there. A point is [x, y] in metres.
 - "verdict" is "command" if the operator wants something done now, also if values are missing. \
 Else say why not, with no commands: "negated" (not to be done), "conditional" (if, when, maybe, \
