@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Sequence
+from concurrent.futures import Executor, Future
 from math import dist
 from typing import Any
 
@@ -48,7 +50,37 @@ BOTH = pytest.mark.parametrize("allocator", ["lns", "oath"])
 """One that reconsiders routes under way, one that does not."""
 
 
-def ready(mission: Mission, allocator: str = "lns", *, points: int = 200, seed: int = 0) -> Runtime:
+class Late(Future[Any]):
+    """An answer that is there only when it was asked for some times."""
+
+    def __init__(self, answer: Any, asked: int) -> None:
+        super().__init__()
+        self.set_result(answer)
+        self.left = asked
+
+    def done(self) -> bool:
+        self.left -= 1
+        return self.left < 0
+
+
+class Slow(Executor):
+    """Works everything out at once but answers late, the same for the same seed."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng = random.Random(seed)
+
+    def submit(self, work: Any, /, *args: Any, **kwargs: Any) -> Late:
+        return Late(work(*args, **kwargs), self.rng.randrange(9))
+
+
+def ready(
+    mission: Mission,
+    allocator: str = "lns",
+    *,
+    points: int = 200,
+    seed: int = 0,
+    solver: Executor | None = None,
+) -> Runtime:
     return Runtime(
         prepare(mission, Params(points=points), seed),
         SimFleet(mission),
@@ -56,6 +88,7 @@ def ready(mission: Mission, allocator: str = "lns", *, points: int = 200, seed: 
         allocator=named(allocator),
         budget=Budget(iterations=200),
         seed=seed,
+        solver=solver,
     )
 
 
@@ -416,9 +449,11 @@ def test_undo_takes_back_one_command_after_the_other() -> None:
 # --- Laws -----------------------------------------------------------------------------------
 
 
-def check_operated(mission: Mission, seed: int, allocator: str, count: int) -> None:
+def check_operated(
+    mission: Mission, seed: int, allocator: str, count: int, solver: Executor | None = None
+) -> None:
     """Whatever is asked of a mission, its run is judged good and every task has an end."""
-    runtime = ready(mission, allocator, points=80, seed=seed)
+    runtime = ready(mission, allocator, points=80, seed=seed, solver=solver)
     if unreachable(runtime.scene):
         return
     operator = Operator(seed, count)

@@ -6,12 +6,15 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from oath.allocate import Allocator, Budget, ByPriority, checked
+from oath.allocate.problem import Problem
 from oath.commands import Command, Live, admit
 from oath.dispatch import (
     Action,
@@ -65,6 +68,8 @@ class Runtime:
         How tasks are assigned.
     journal
         Called with the events that happen together, before any of them is applied.
+    solver
+        Works out assignments while the mission goes on; None lets the mission wait for them.
     """
 
     def __init__(
@@ -77,8 +82,11 @@ class Runtime:
         budget: Budget,
         seed: int,
         journal: Callable[[Sequence[AnyEvent]], None] = lambda events: None,
+        solver: Executor | None = None,
     ) -> None:
         self.scene = scene
+        self._solver = solver
+        self._solving: Future[Allocated] | None = None
         self._fleet, self._journal = fleet, journal
         self._name, self._allocator, self._budget, self._seed = name, allocator, budget, seed
         mission, world = scene.mission, scene.world
@@ -137,11 +145,22 @@ class Runtime:
 
     def step(self, until: float = math.inf) -> bool:
         """Let the next thing happen if it does until some time [s]; say whether it did."""
+        self.collect()
         due = self._fleet.events(until)
+        if not due and until == math.inf and self._solving is not None:
+            self.collect(wait=True)
+            return True
         self._apply(due)
         reached = until if not due and until < math.inf else 0.0
         self.now = max(self.now, self.state.t, reached)
         return bool(due)
+
+    def collect(self, *, wait: bool = False) -> None:
+        """Take up the answer of the solver if it has one, or wait for it."""
+        if self._solving is not None and (wait or self._solving.done()):
+            answer, self._solving = self._solving.result(), None
+            if not self.state.finished:
+                self._apply([replace(answer, t=max(self.now, self.state.t))])
 
     def poses(self) -> Mapping[str, Pose]:
         """Where every robot is now."""
@@ -237,7 +256,7 @@ class Runtime:
     def _perform(self, action: Action) -> list[AnyEvent]:
         match action:
             case Allocate():
-                return [self._allocate()]
+                return self._allocate()
             case Plan(robot, reason):
                 return [self._plan(robot, reason)]
             case Repair(robot, obstacle):
@@ -259,23 +278,31 @@ class Runtime:
         for planner in self._planners.values():
             planner.update(edges)
 
-    def _allocate(self) -> Allocated:
+    def _allocate(self) -> list[AnyEvent]:
         begin = time.perf_counter()
         problem = pose(self.scene, self.state, self._under_way())
+        solve = partial(self._solve, problem, self.state.rounds, begin)
+        if self._solver is None:
+            return [replace(solve(), t=self.state.t)]
+        self._solving = self._solver.submit(solve)
+        return []
+
+    def _solve(self, problem: Problem, round: int, begin: float) -> Allocated:
+        """Work an assignment out, maybe in another thread: at most one is in flight."""
         assignment = checked(ByPriority(self._allocator), problem, self._budget, self._rng)
         return Allocated(
-            t=self.state.t,
-            round=self.state.rounds,
+            t=0.0,
+            round=round,
             seconds=time.perf_counter() - begin,
             routes=assignment.routes,
             unassigned=assignment.unassigned,
         )
 
     def _under_way(self) -> dict[str, UnderWay]:
-        found = {}
+        found, poses = {}, self._fleet.poses()
         for id, robot in self.state.robots.items():
             if robot.route:
-                at = self._fleet.poses()[id].at
+                at = poses[id].at
                 rest, on = self._planners[id].ahead()
                 at_work = self._at_work(id) and id not in self.state.paused
                 found[id] = UnderWay(rest, math.dist(at, rest), on, at_work)

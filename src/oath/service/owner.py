@@ -293,6 +293,7 @@ class Owner(threading.Thread):
     def _tick(self) -> bool:
         """Bring the mission up to date; return whether it is over and nobody waits for more."""
         self.clock.tick()
+        self._runtime.collect()  # also while the clock is held
         self._catch_up()
         self._tell()
         if not self._until_done:

@@ -8,6 +8,7 @@ import gc
 import signal
 import socket
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import uvicorn
@@ -248,6 +249,7 @@ def begin(
         budget=running.budget,
         seed=running.seed,
         journal=happen,
+        solver=ThreadPoolExecutor(1, thread_name_prefix="solver"),
     )
     if not events:
         runtime.start()
