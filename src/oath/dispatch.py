@@ -225,7 +225,7 @@ def _allocated(state: State, event: Allocated) -> tuple[State, tuple[Action, ...
     actions: tuple[Action, ...] = tuple(
         Plan(robot, "allocated") for robot in changed if robot not in same
     )
-    if state.rounds > event.round:
+    if state.rounds > event.round or len(routes) < len(event.routes):
         state, more = _allocate(state)
         return state, actions + more
     return state, actions + _finish_if_still(state)
@@ -266,7 +266,12 @@ def _is_past(state: State, robot: str, stop: RouteStop) -> bool:
 
 
 def _fits(state: State, robot: str, route: Route) -> bool:
-    """Whether a route delivers all that its robot can, and takes up only what it may."""
+    """Whether a route delivers all that its robot can, and takes up only what it may and can."""
+    load = len(state.robots[robot].carrying)
+    for stop in route:
+        load += {"pickup": 1, "delivery": -1}.get(stop.stop, 0)
+        if load > state.robots[robot].capacity:
+            return False
     carrying = set(state.deliverable(robot))
     tasks = {stop.task for stop in route}
     may_begin = set(state.open_tasks()) if robot not in state.failed else set()

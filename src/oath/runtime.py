@@ -199,7 +199,7 @@ class Runtime:
         for event in events:
             if isinstance(event, RobotPaused | RobotFailed):
                 self._fleet.cancel(event.robot, at_once=True)
-        self.advance(self.now)
+        self._apply(self._fleet.events(self.now))
         self._together(events)
         return events
 

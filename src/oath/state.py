@@ -19,6 +19,8 @@ class RobotState:
     position: Point
     route: Route = ()
     carrying: tuple[str, ...] = ()
+    capacity: int = 1
+    """Tasks that it has room for."""
     stale: bool = False
     """The plan ends differently than the route; it is due anew after the next stop."""
     left: float = 0.0
@@ -73,7 +75,10 @@ class State:
         return cls(
             t=0.0,
             tasks={task.id: task for task in mission.tasks},
-            robots={robot.id: RobotState(position=robot.start) for robot in mission.robots},
+            robots={
+                robot.id: RobotState(position=robot.start, capacity=robot.capacity)
+                for robot in mission.robots
+            },
             reconsiders=reconsiders,
             obstacles={id: one for id, one in obstacles.items() if one.known},
             hidden={id: one for id, one in obstacles.items() if not one.known},

@@ -86,18 +86,21 @@ def _judge_urgency(record: Record) -> Iterator[Violation]:
     """In an answer of the allocator, no robot begins other work before its urgent tasks.
 
     Let off is the stop at which a robot is at work, and robots that are paused: they do nothing.
+    An answer that comes later than a priority may have been under way before; the next may not.
     """
     priority: dict[str, Priority] = {task.id: task.priority for task in record.mission.tasks}
     stops = {task.id: task for task in record.mission.tasks}
     begun: set[str] = set()
     paused: set[str] = set()
+    news: dict[str, float] = {}  # when priorities came that no answer has followed yet
     for seq, event in record.usable:
         match event:
             case TaskAdded(task=task):
+                news[task.id] = event.t
                 priority[task.id], stops[task.id] = task.priority, task
                 begun.discard(task.id)
             case PriorityChanged(task=id):
-                priority[id] = event.priority
+                priority[id], news[id] = event.priority, event.t
             case StopServed(task=id):
                 begun.add(id)
             case RobotPaused(robot=robot):
@@ -110,9 +113,11 @@ def _judge_urgency(record: Record) -> Iterator[Violation]:
                     there = stops[route[0].task].stop(route[0].stop).at if route else at
                     rest = route[1:] if apart(at, there) <= TOLERANCE else route
                     waits = None if robot in paused else _waits(rest, priority, begun)
-                    if waits:
+                    known = [news.get(task, event.t) >= event.t - TOLERANCE for task in waits or ()]
+                    if waits and all(known):
                         text = f"its urgent task '{waits[0]}' has to wait for task '{waits[1]}'"
                         yield Violation(rule="priority", seq=seq, robot=robot, message=text)
+                news.clear()
             case _:
                 pass
 
