@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -35,6 +35,12 @@ def live() -> Live:
     corners = ((7.0, 5.0), (8.0, 5.0), (8.0, 4.8), (7.0, 4.8))
     known = {id: Obstacle(id=id, kind=id[:-2], polygon=corners) for id in ("wall-1", "bush-3")}
     return Live(scene, replace(state, obstacles=known))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _world_goes() -> Iterator[None]:
+    yield
+    live.cache_clear()
 
 
 def say(*turns: str) -> Reply:

@@ -145,20 +145,21 @@ def role_features(tokens: Sequence[Token], at: int) -> set[str]:
 class Linear:
     """A softmax regression over sets of features: p ~ exp(bias + mean of the features' rows).
 
-    `weights` has a row for each feature and a column for each class.
+    `weights` has a row for each feature and a column for each class, in units of `scale`.
     """
 
     classes: tuple[str, ...]
     rows: dict[str, int]
-    weights: NDArray[np.float64]
+    weights: NDArray[Any]
     bias: NDArray[np.float64]
+    scale: float = 1.0
 
     def __call__(self, found: set[str]) -> dict[str, float]:
         """The probability of each class."""
         at = [self.rows[one] for one in found if one in self.rows]
         score = self.bias.copy()
         if at:
-            score += self.weights[at].sum(axis=0) / np.sqrt(len(at))
+            score += self.weights[at].sum(axis=0) * (self.scale / np.sqrt(len(at)))
         score -= score.max()
         share = np.exp(score)
         return dict(zip(self.classes, (share / share.sum()).tolist(), strict=True))
@@ -199,9 +200,10 @@ def _linear(arrays: Mapping[str, NDArray[Any]], name: str) -> Linear:
     features = _text(arrays[f"{name}_features"])
     return Linear(
         tuple(_text(arrays[f"{name}_classes"])),
-        {feature: n for n, feature in enumerate(features)},
-        arrays[f"{name}_weights"] * float(arrays[f"{name}_scale"]),
+        dict(zip(features, range(len(features)), strict=True)),
+        arrays[f"{name}_weights"],
         arrays[f"{name}_bias"],
+        float(arrays[f"{name}_scale"]),
     )
 
 

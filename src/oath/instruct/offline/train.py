@@ -37,8 +37,8 @@ STRENGTH = 0.1
 def fit(rows: Sequence[set[str]], labels: Sequence[str], strength: float = STRENGTH) -> Linear:
     """Softmax regression: least cross entropy plus ``strength / 2 |weights|^2``.
 
-    Every class weighs the same in sum up to a factor of two; features of one utterance only are
-    left out.
+    Every class weighs the same in sum up to a factor of two; features of one utterance only
+    are left out.
     """
     from scipy.optimize import minimize
     from scipy.sparse import csr_array
@@ -97,14 +97,14 @@ def pack(models: Models) -> bytes:
     }
     for name, one in (("intent", models.intent), ("role", models.role)):
         scale = np.abs(one.weights).max() / 127.0
-        keep = (np.abs(one.weights) >= scale / 2).any(axis=1)
+        keep = (np.abs(one.weights) >= 2 * scale).any(axis=1)
         arrays[f"{name}_classes"] = _text(one.classes)
         arrays[f"{name}_features"] = _text([f for f, k in zip(one.rows, keep, strict=True) if k])
         arrays[f"{name}_weights"] = np.rint(one.weights[keep] / scale).astype(np.int8)
         arrays[f"{name}_bias"] = one.bias.round(4)
         arrays[f"{name}_scale"] = np.array(scale)
     buffer = io.BytesIO()
-    np.savez_compressed(buffer, allow_pickle=False, **arrays)
+    np.savez(buffer, allow_pickle=False, **arrays)
     return buffer.getvalue()
 
 
