@@ -20,6 +20,7 @@ _REFUSED = re.compile(
     r"\b(ignore|disregard|forget|override|bypass) (\w+ ){0,3}(instructions?|rules?|prompts?"
     r"|commands?"
     r"|checks?|confirmations?|safety|everything|above|previous|restrictions?|guidelines?)\b"
+    r"|\bwhat (you|i) (were|have been|was) told\b"
     r"|\b(system prompt|developer mode|jailbreak|you are now|act as|pretend|password|api key"
     r"|without (asking|confirming|confirmation|any confirmation|a confirmation)|do not ask"
     r"|no questions"
@@ -230,6 +231,8 @@ def not_meant(line: str, intent: str) -> str | None:
             return "You say what not to do, so I change nothing."
         if _IF.search(_IF_POLITE.sub(" ", line)):
             return "I cannot wait for a condition, so I change nothing yet."
+        if re.match(r"(what|why|when|who|how) (do|does|did|is|was|can|would|happens)\b", line):
+            return "That sounds like a question, so I change nothing."
     elif intent != "query_status":
         asks = line.rstrip().endswith("?") and not _ASKS_FOR.search(line)
         if _ASKS_ABOUT.search(line) or _ASKS.search(line) or asks:
@@ -249,7 +252,15 @@ def not_meant(line: str, intent: str) -> str | None:
     return None
 
 
+_UNWANTED = re.compile(r"\bnot (want|need|ask) (<\w+>|you|me|us|him|anyone|the \w+) to\b")
+_SOUND = re.compile(
+    r"\b(is|has|did) not (been )?(broken?|dead|fail(ed)?|stuck|damaged|down|out|lost)\b"
+)
+
+
 def _is_denied(line: str, intent: str) -> bool:
+    if _UNWANTED.search(line) or (intent == "robot_failed" and _SOUND.search(line)):
+        return True
     rest = _NOT_AFTER_ALL.sub(" ", line)
     if intent in ("remove_obstacle", "cancel_task", "change_task_priority", "robot_failed"):
         rest = re.sub(
@@ -309,7 +320,8 @@ _AGAINST = {
     r"|is working"
     r"|charge|again|back|reboot)\b(?! and)",
     "resume_robot": r"(?<!off )(?<!the )\b(stop|pause|hold|halt|wait|freeze)$",
-    "cancel_task": r"\b(not|never) (\w+ )?(forget|miss|lose)\b",
+    "cancel_task": r"\b(not|never) (\w+ )?(forget|miss|lose)\b"
+    r"|\b(without delay|urgent|asap|first|just normal|high|priority)\b",
     "add_task": r"\b(cancel|delete|remove|abort|undo|wall|obstacle|blocked)\b",
 }
 """Words that speak against an intent, however likely the rest makes it."""

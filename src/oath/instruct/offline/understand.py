@@ -14,7 +14,7 @@ from oath.instruct.offline import gates, questions, slots
 from oath.instruct.offline.heard import Filled, Heard
 from oath.instruct.offline.tokens import Token
 
-LIKELY = 0.5
+LIKELY = 0.6
 """How probable an intent must be to be acted on."""
 
 SURE_PRIORITY = 0.8
