@@ -12,6 +12,8 @@ void bind_selection(nb::module_& m);
 void bind_workspace(nb::module_& m);
 
 NB_MODULE(_core, m) {
+    // A server or a chat ends with its mission still alive in some thread: that is no leak.
+    nb::set_leak_warnings(false);
     m.doc() = "Compiled algorithms of OATH; those that take long release the interpreter lock.";
     bind_workspace(m);
     bind_graph(m);

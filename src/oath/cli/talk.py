@@ -194,33 +194,43 @@ def _tell_news(runtime: Runtime, told: int) -> int:
 
 def acts(
     runtime: Runtime, entries: Iterable[Entry], interpreter: Callable[[], Interpreter]
-) -> Iterator[tuple[float, Callable[[], None]]]:
-    """What a script does in a mission, and when [s]; every answer goes to stderr."""
+) -> list[tuple[float, Callable[[], None]]]:
+    """Return what a script does in a mission, and when [s]; every answer goes to stderr.
+
+    Raises
+    ------
+    BadInput
+        If an entry is no command.
+    """
     from functools import partial
 
-    entries = list(entries)
-    if not entries:
-        return
+    steps = [(entry, _command(entry)) for entry in entries]
+    if not steps:
+        return []
     conversation = _conversation(runtime, interpreter())
-    for entry in entries:
-        yield entry.at, partial(_act, runtime, conversation, entry)
+    return [
+        (entry.at, partial(_act, runtime, conversation, entry, command)) for entry, command in steps
+    ]
 
 
-def _act(runtime: Runtime, conversation: Conversation, entry: Entry) -> None:
+def _command(entry: Entry) -> Command | None:
     from oath.commands import parse
     from oath.errors import BadInput
 
-    if entry.say is not None:
-        answer, what = conversation.say(entry.say), entry.say
+    try:
+        return None if entry.do is None else parse(entry.do)
+    except BadInput as error:
+        where = entry.where
+        raise BadInput(error.problem, file=where, field=error.field, remedy=error.remedy) from None
+
+
+def _act(
+    runtime: Runtime, conversation: Conversation, entry: Entry, command: Command | None
+) -> None:
+    if command is not None:
+        _report(runtime, command.intent, answer := conversation.propose([command]))
     else:
-        try:
-            command = parse(entry.do)
-        except BadInput as error:
-            raise BadInput(
-                error.problem, file=entry.where, field=error.field, remedy=error.remedy
-            ) from None
-        answer, what = conversation.propose([command]), command.intent
-    _report(runtime, what, answer)
+        _report(runtime, str(entry.say), answer := conversation.say(str(entry.say)))
     if answer.proposal is not None and entry.confirm:
         _report(runtime, "yes", conversation.say("yes"))
 
@@ -231,7 +241,9 @@ def _report(runtime: Runtime, what: str, answer: Answer) -> None:
 
 
 def _lines(stream: Any) -> Iterator[str]:
-    """Yield lines without their ends; one that is too long comes cut, what is no text as it is."""
+    """Yield lines without their ends; one that is too long comes cut, what is no text replaced."""
+    if hasattr(stream, "reconfigure"):
+        stream.reconfigure(errors="replace")
     while line := stream.readline(LINE):
         if len(line) == LINE and not line.endswith("\n"):
             while (rest := stream.readline(LINE)) and not rest.endswith("\n"):
