@@ -20,7 +20,6 @@ from oath.dispatch import (
     Action,
     Allocate,
     Drive,
-    Finish,
     Plan,
     Repair,
     UpdateMap,
@@ -153,7 +152,7 @@ def idle() -> RobotState:
 
 def test_a_round_that_gives_nothing_to_idle_robots_ends_the_mission() -> None:
     after, actions = pure(state(allocating=True), allocated({"r1": (), "r2": ()}, a="why"))
-    assert actions == (Finish(),)
+    assert actions == ()
     assert not after.finished
     assert pure(after, ev.MissionFinished(t=3.0, summary={}))[0].finished
 
@@ -267,7 +266,7 @@ def test_the_last_task_of_all_ends_the_mission() -> None:
         completed=frozenset("ab"),
         robots={"r1": RobotState(position=(1, 1), route=route("c")), "r2": idle()},
     )
-    assert pure(ready, served("r1", route("c")[0]))[1] == (Finish(),)
+    assert pure(ready, served("r1", route("c")[0]))[1] == ()
 
 
 def test_the_mission_does_not_end_while_somebody_drives_or_a_round_is_on() -> None:
@@ -346,7 +345,7 @@ def test_a_failed_robot_strands_what_it_carries_until_that_comes_back_as_it_does
     assert after.waiting() == ("b", "c", "a")
     # One answer that knows of all this is enough, an older one is not.
     answer = allocated({"r1": (), "r2": ()}, round=after.rounds)
-    assert pure(after, answer)[1] == (Finish(),)
+    assert pure(after, answer)[1] == ()
     assert pure(after, replace(answer, round=after.rounds - 1))[1] == (Allocate(),)
 
 
@@ -473,7 +472,6 @@ class Chaos:
         self.plans: list[tuple[str, Any]] = []
         self.driving: set[str] = set()
         self.changes = 6
-        self.finishes = 0
 
     def run(self) -> None:
         self.apply(started())
@@ -490,7 +488,6 @@ class Chaos:
         else:
             pytest.fail("the mission does not end")
         # Nothing is in flight any more: dispatch must have said that this is the end.
-        assert self.finishes >= 1
         assert not self.state.allocating
         assert not any(robot.route for robot in self.state.robots.values())
 
@@ -510,8 +507,6 @@ class Chaos:
                     assert self.state.robots[robot].route, f"{robot} is sent nowhere"
                     assert robot not in self.state.paused | self.state.failed
                     self.driving.add(robot)
-                case Finish():
-                    self.finishes += 1
         assert self.state.allocating == (self.asked is not None)
 
     def next_event(self) -> list[ev.AnyEvent]:

@@ -72,12 +72,7 @@ class UpdateMap:
     obstacle: str
 
 
-@dataclass(frozen=True, slots=True)
-class Finish:
-    """Nothing is left to do; answer with `MissionFinished` once all robots stand."""
-
-
-Action = Allocate | Plan | Repair | Drive | UpdateMap | Finish
+Action = Allocate | Plan | Repair | Drive | UpdateMap
 
 
 def advance(state: State, event: AnyEvent) -> tuple[State, tuple[Action, ...]]:
@@ -225,10 +220,10 @@ def _allocated(state: State, event: Allocated) -> tuple[State, tuple[Action, ...
     actions: tuple[Action, ...] = tuple(
         Plan(robot, "allocated") for robot in changed if robot not in same
     )
-    if state.rounds > event.round or len(routes) < len(event.routes):
+    if state.rounds > event.round:
         state, more = _allocate(state)
         return state, actions + more
-    return state, actions + _finish_if_still(state)
+    return state, actions
 
 
 def _still_good(state: State, routes: Mapping[str, Route]) -> dict[str, Route]:
@@ -285,7 +280,7 @@ def _fits(state: State, robot: str, route: Route) -> bool:
 def _planned(state: State, event: Planned) -> tuple[State, tuple[Action, ...]]:
     robot, task = state.robots[event.robot], event.unreachable
     if not robot.route:
-        return state, _finish_if_still(state)
+        return state, ()
     state = _with(state, event.robot, stale=False)
     if event.length is not None:
         state = _with(state, event.robot, left=event.length)
@@ -334,7 +329,7 @@ def _stop_served(state: State, event: StopServed) -> tuple[State, tuple[Action, 
         return state, on
     if state.waiting() or (state.reconsiders and state.open_tasks()):
         return _allocate(state)
-    return state, _finish_if_still(state)
+    return state, ()
 
 
 def _obstacle_added(state: State, obstacle: Obstacle) -> tuple[State, tuple[Action, ...]]:
@@ -405,8 +400,3 @@ def _robot_resumed(state: State, event: RobotResumed) -> tuple[State, tuple[Acti
     state, more = _allocate(replace(state, paused=state.paused - {event.robot}))
     on = (Plan(event.robot, "command"),) if state.robots[event.robot].route else ()
     return state, (*on, *more)
-
-
-def _finish_if_still(state: State) -> tuple[Action, ...]:
-    still = not any(robot.route for robot in state.robots.values())
-    return (Finish(),) if still and not state.allocating else ()

@@ -20,7 +20,6 @@ from oath.dispatch import (
     Action,
     Allocate,
     Drive,
-    Finish,
     Plan,
     Repair,
     UpdateMap,
@@ -265,8 +264,6 @@ class Runtime:
                 self._drive(robot)
             case UpdateMap(obstacle):
                 self._update_map(obstacle)
-            case Finish():
-                pass  # a run ends when nothing happens any more, a server when it is told to
         return []
 
     def _update_map(self, obstacle: str) -> None:
