@@ -244,7 +244,6 @@ def test_interpreting_may_last_while_the_conversation_goes_on(runtime: Runtime, 
     slow = speaking.hear("add")
     assert callable(slow)
     # A yes that comes meanwhile means nothing that was read back before.
-    assert speaking.pending is None
     assert speaking.say("yes").done == ()
     assert [command.intent for command in speaking.say("stop").done] == ["pause_robot"]
     answer = speaking.take(slow())

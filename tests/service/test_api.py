@@ -168,7 +168,8 @@ def test_all_commands_or_none(server: Server) -> None:
     ]
     answer = server.post("/api/commands", {"id": "both", "commands": commands})
     assert refused(answer, 409)["field"] == "task_label"
-    assert server.get("/api/health")["seq"] == before
+    since = server.get("/api/events", since=before)["events"]
+    assert not {"commanded", "robot_paused"} & {event["type"] for event in since}
 
 
 @pytest.mark.parametrize(
@@ -366,3 +367,9 @@ def test_bad_missions_leave_no_journal(tmp_path: Path) -> None:
     path = tmp_path / "maze.journal"
     assert run(str(tmp_path / "none.yaml"), "--journal", str(path), "--port", "0").returncode == 2
     assert not path.exists()
+
+
+def test_a_parameter_given_twice(server: Server) -> None:
+    with server.client() as client:
+        answer = client.get("/api/state?seq=1&seq=0")
+    assert refused(answer, 422)["field"] == "seq"

@@ -83,6 +83,9 @@ class Guard:
             return self._entry(scope)
         if role == "viewer" and scope["type"] == "http" and scope["method"] not in _READS:
             return failure(403, "viewers change nothing", "use the operator's token")
+        query = parse_qs(scope["query_string"].decode("latin-1"), keep_blank_values=True)
+        if twice := next((name for name, values in query.items() if len(values) > 1), None):
+            return failure(422, f"{twice!r} is given more than once", "give it once", twice)
         return None
 
     def _entry(self, scope: Scope) -> Response:
