@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 import oath
 from missions import cell, delivery, gate, missions, random_mission, robot, visit, yard
+from oath import dispatch
 from oath import events as ev
 from oath.dispatch import (
     Action,
@@ -643,3 +644,21 @@ def test_a_run_with_a_stranded_task_rebuilds_its_state() -> None:
     assert state.stranded.keys() == {"a"}
     assert state.completed == {"b"}
     assert state.unserved()["c"] == "no room: the robots that could take it are full"
+
+
+# --- Many events ----------------------------------------------------------------------------
+
+
+def test_folding_is_advancing_event_by_event() -> None:
+    mission = oath.load("missions/maze-25-gates.yaml")
+    events = oath.run(mission, allocator="greedy").events
+    state, calls = State.of(mission), []
+    for event in events:
+        state, actions = advance(state, event)
+        calls += actions
+    told, wanted, last = [], [], State.of(mission)
+    for run, after, actions in dispatch.fold(last, events):
+        told += run
+        wanted += actions
+        last = after
+    assert (tuple(told), wanted, last) == (events, calls, state)

@@ -7,8 +7,9 @@ as events, so the events alone rebuild every state.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 from oath.events import (
     Allocated,
@@ -82,7 +83,7 @@ def advance(state: State, event: AnyEvent) -> tuple[State, tuple[Action, ...]]:
     (completed, carried, stranded, routed and waiting partition the tasks).
     """
     if isinstance(event, Moved):  # most events are: they cost one copy of the state, not three
-        return _moved(state, event), ()
+        return _moved(state, [event]), ()
     state = _record(replace(state, t=max(state.t, event.t)), event)
     match event:
         case MissionStarted():
@@ -121,6 +122,24 @@ def advance(state: State, event: AnyEvent) -> tuple[State, tuple[Action, ...]]:
             return replace(state, finished=True), ()
         case Commanded():
             return state, ()
+
+
+def fold(
+    state: State, events: Iterable[AnyEvent]
+) -> Iterator[tuple[list[AnyEvent], State, tuple[Action, ...]]]:
+    """Apply events in order: yield the next of them, the state after these and what it calls for.
+
+    Moves that follow each other come together: one copy of the state does for all of them.
+    """
+    for are_moves, run in groupby(events, lambda event: isinstance(event, Moved)):
+        if are_moves:
+            moves = list(run)
+            state = _moved(state, moves)  # type: ignore[arg-type]
+            yield moves, state, ()
+        else:
+            for event in run:
+                state, actions = advance(state, event)
+                yield [event], state, actions
 
 
 def failure(state: State, robot: str, at: Point) -> tuple[AnyEvent, ...]:
@@ -190,11 +209,17 @@ def _opposite(state: State, event: AnyEvent) -> AnyEvent | None:
     return None
 
 
-def _moved(state: State, event: Moved) -> State:
-    robot = state.robots[event.robot]
-    left = max(robot.left - math.dist(event.from_, event.to), 0.0)
-    robots = {**state.robots, event.robot: replace(robot, position=event.to, left=left)}
-    return replace(state, t=max(state.t, event.t), robots=robots, recording=False)
+def _moved(state: State, moves: Sequence[Moved]) -> State:
+    at: dict[str, Point] = {}
+    left: dict[str, float] = {}
+    for move in moves:
+        robot = move.robot
+        before = left[robot] if robot in left else state.robots[robot].left
+        left[robot] = max(before - math.dist(move.from_, move.to), 0.0)
+        at[robot] = move.to
+    drove = {id: replace(state.robots[id], position=at[id], left=left[id]) for id in at}
+    t = max(state.t, max(move.t for move in moves))
+    return replace(state, t=t, robots={**state.robots, **drove}, recording=False)
 
 
 def _with(state: State, robot: str, **changes: object) -> State:

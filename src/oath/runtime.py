@@ -25,6 +25,7 @@ from oath.dispatch import (
     UpdateMap,
     advance,
     failure,
+    fold,
 )
 from oath.events import (
     Allocated,
@@ -119,15 +120,20 @@ class Runtime:
         name = self.scene.mission.name
         self._apply([MissionStarted(t=0.0, mission=name, allocator=self._name, seed=self._seed)])
 
-    def resume(self, events: Iterable[AnyEvent]) -> None:
-        """Go on where these events end; the fleet's robots must stand where they were last seen."""
-        for event in events:
-            self.events.append(event)
-            self._track(event)
-            self.state, actions = advance(self.state, event)
+    def follow(self, events: Iterable[AnyEvent]) -> None:
+        """Take up what happened before, and do nothing about it until `resume`."""
+        for run, state, actions in fold(self.state, events):
+            for event in run:
+                self._track(event)
+            self.events += run
+            self.state = state
             for action in actions:
                 if isinstance(action, UpdateMap):
                     self._perform(action)
+
+    def resume(self, events: Iterable[AnyEvent] = ()) -> None:
+        """Go on where events end; the fleet's robots must stand where they were last seen."""
+        self.follow(events)
         self.now = self.state.t
         if self.state.finished or not self.events:
             return

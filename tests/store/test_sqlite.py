@@ -460,6 +460,13 @@ def test_old_events_that_nobody_understands(tmp_path: Path, text: str) -> None:
             read(path, upcasters=upcasters)
 
 
+def test_text_that_is_no_text_elsewhere_is_read_back(path: Path) -> None:
+    odd = RobotPaused(t=1.0, robot="half a \ud83d smile")
+    with closing(SqliteJournal(path)) as journal:
+        (seq,) = journal.append([odd])
+        assert journal.replay(seq) == [odd]
+
+
 # --- How a mission began --------------------------------------------------------------------
 
 

@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
-from oath.dispatch import advance
+from oath.dispatch import fold
 from oath.events import (
     AnyEvent,
     Moved,
@@ -134,7 +134,8 @@ class History:
         index = bisect_right(self._counts, seq + 1) - 1
         state, tally = self._points[index]
         tally = tally.copy()
-        for event in self.events[self._counts[index] : seq + 1]:
-            state, _ = advance(state, event)
-            tally.add(event)
+        for events, after, _ in fold(state, self.events[self._counts[index] : seq + 1]):
+            state = after
+            for event in events:
+                tally.add(event)
         return state, tally

@@ -255,12 +255,10 @@ def begin(
         runtime.start()
         return runtime
 
-    def watched() -> Iterator[AnyEvent]:
-        for n, event in enumerate(events, 1):
-            yield event
-            history.add([event])
-            if n % EVERY == 0:
-                history.stands(runtime.state)
-
-    runtime.resume(watched())
+    for first in range(0, len(events), EVERY):
+        some = events[first : first + EVERY]
+        runtime.follow(some)
+        history.add(some)
+        history.stands(runtime.state)
+    runtime.resume()
     return runtime

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
 from oath.allocate import allocator as named
-from oath.dispatch import advance
+from oath.dispatch import fold
 from oath.errors import BadInput
 from oath.events import AnyEvent
 from oath.formats import mission as mission_file
@@ -146,6 +146,6 @@ def replayed(state: State, events: Iterable[AnyEvent]) -> State:
 
     Law: ``replayed(replayed(s, a), b) == replayed(s, a + b)``.
     """
-    for event in events:
-        state, _ = advance(state, event)
+    for _, after, _ in fold(state, events):
+        state = after
     return state

@@ -19,6 +19,8 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
+from pydantic_core import from_json
+
 from oath.errors import BadInput, StoreError
 from oath.events import AnyEvent
 from oath.formats.event_log import rebuilt, to_line
@@ -403,6 +405,14 @@ def _check(
     return count, hash
 
 
+def _line(data: str) -> Any:
+    """Read an event's text."""
+    try:
+        return from_json(data)  # three times as fast, but it does not take every text
+    except ValueError:
+        return json.loads(data)
+
+
 def _damaged(path: Path, whole: int, problem: str) -> BadInput:
     remedy = "restore it from a copy"
     if whole:
@@ -416,7 +426,7 @@ def _events(
     now = current(upcasters)
     for seq, _, _, version, data, _ in rows:
         try:
-            line = json.loads(data)
+            line = _line(data)
             yield rebuilt(line if version == now else upcast(line, version, upcasters))
         except (KeyError, TypeError, ValueError, BadInput) as error:
             problem = f"event {seq} has data that cannot be read ({error})"

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import label
 from scipy.spatial import cKDTree
 
 from oath.model import Point
@@ -33,6 +32,8 @@ def missed(roadmap: Roadmap, mode: int) -> list[Missed]:
     A cell is free if a robot fits at its centre. Parts smaller than the robot's own square are left
     out: they are raster noise or of no use.
     """
+    from scipy.ndimage import label  # a quarter of a second to import
+
     cells, corner, size = _free_cells(roadmap, mode)
     regions, count = label(cells)
     nodes = roadmap.nodes()
