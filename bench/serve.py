@@ -1,7 +1,7 @@
 """How much of a core a mission server needs, and how late its clients hear of what happens.
 
-Run with ``python bench/serve.py [--quick]``. The server is a process of its own. First commands are
-timed on the paper's maze, then 200 robots of a generated mission drive and 20 clients listen
+Run with ``python bench/serve.py [--quick]``. The server is a process of its own. First its start on a
+long journal is timed, then commands on the paper's maze, then 200 robots of a generated mission drive and 20 clients listen
 through sockets. A frame's lag is the wall time between its mission clock and when a client has it,
 counted from the fastest frame of the last seconds: what the fastest needs (about 1 ms) is left out,
 but what the mission clock waits for planning counts. What the server itself measures, from when
@@ -22,7 +22,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Iterator
-from contextlib import AsyncExitStack, contextmanager
+from contextlib import AsyncExitStack, closing, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -30,7 +30,11 @@ from typing import Any
 import httpx
 import numpy as np
 import yaml
+from journal import MISSION, long_log
 from websockets.asyncio.client import ClientConnection, connect
+
+from oath.store import Origin
+from oath.store.sqlite import SqliteJournal
 
 MAZE = Path(__file__).parent.parent / "missions" / "maze-25.yaml"
 TOKEN = "token-of-the-bench"
@@ -71,11 +75,18 @@ def hall(robots: int, tasks: int, seed: int = 0) -> dict[str, Any]:
 
 
 @contextmanager
-def serving(mission: Path, *options: str) -> Iterator[tuple[int, str]]:
+def serving(mission: Path, *options: str, journal: Path | None = None) -> Iterator[tuple[int, str]]:
     """Start a server; yield its process and address."""
     command = [sys.executable, "-m", "oath.cli", "serve", str(mission), "--port", "0"]
     with TemporaryDirectory() as folder:
-        command += ["--token", TOKEN, "--journal", f"{folder}/journal", "--rate", "1000000"]
+        command += [
+            "--token",
+            TOKEN,
+            "--journal",
+            str(journal or f"{folder}/journal"),
+            "--rate",
+            "1000000",
+        ]
         process = subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True)
         try:
             assert process.stdout is not None
@@ -154,7 +165,9 @@ async def commands(
                 "add_task",
                 {"location": [11.0, 3.0 + n % 7 / 10], "delivery_point": rng.choice("bcde")},
             ),
-        ][n % 4]
+            ("obstacle_update", {"obstacle_location": [[7, 5], [8, 5]], "obstacle_type": "wall"}),
+            ("undo", {}),
+        ][n % 6]
         body = {"id": f"c{n}", "commands": [{"intent": intent, "parameters": parameters}]}
         begin = time.monotonic()
         answer = await http.post("/api/commands", json=body)
@@ -180,12 +193,31 @@ def client(url: str) -> httpx.AsyncClient:
     return httpx.AsyncClient(base_url=url, headers=headers, timeout=60, trust_env=False)
 
 
+def start_time(events: int, starts: int) -> None:
+    """Time starts on a long journal, from nothing to an answer."""
+    origin, log = Origin.of(MISSION, allocator="lns", seed=1), long_log(events)
+    walls, shares = [], []
+    for _ in range(starts):
+        with TemporaryDirectory() as folder:
+            path = Path(folder, "journal")
+            with closing(SqliteJournal.create(path, origin)) as journal:
+                journal.append(log)
+            begin = time.monotonic()
+            with serving(Path(MISSION), "--seed", "1", journal=path) as (process, url):
+                headers = {"Authorization": f"Bearer {TOKEN}"}
+                httpx.get(f"{url}/api/health", headers=headers, trust_env=False).raise_for_status()
+                walls.append(time.monotonic() - begin)
+                shares.append(cpu(process))
+    about = f"start on {events} events until it answers, median of {starts}: wall, processor"
+    table(about, f"{np.median(walls):.2f}, {np.median(shares):.2f} s", "<= 2 s")
+
+
 async def command_time(url: str, seconds: float) -> None:
     """Time commands to a small mission."""
     async with client(url) as http:
         state = (await http.get("/api/state")).json()
         robots, tasks = ([one["id"] for one in state[what]] for what in ("robots", "tasks"))
-        rate = 5.0
+        rate = 10.0
         told(*await commands(http, rate, seconds, robots, tasks), rate, "p95 <= 25 ms")
 
 
@@ -249,8 +281,12 @@ def main() -> None:
     parser.add_argument("--tasks", type=int, default=600)
     parser.add_argument("--clients", type=int, default=20)
     parser.add_argument("--allocator", default="greedy", help="of the many robots")
+    parser.add_argument("--events", type=int, default=100_000, help="in the long journal")
     given = parser.parse_args()
     seconds = 10.0 if given.quick else 30.0
+    table("start", "measured", "figure")
+    start_time(given.events, 5)
+    print()
     table("maze-25, 4 robots", "measured", "figure")
     with serving(MAZE) as (_, url):
         asyncio.run(command_time(url, seconds))

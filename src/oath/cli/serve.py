@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from oath.instruct import Interpreter
     from oath.model import Mission
+    from oath.picture.recording import Recorder
     from oath.service.server import Running
     from oath.store import Origin
     from oath.store.sqlite import SqliteJournal
@@ -44,6 +45,12 @@ BUDGET = 0.05
     "--journal",
     type=click.Path(dir_okay=False, path_type=Path),
     help="File that keeps the mission; if there is one, its mission goes on.",
+)
+@click.option(
+    "--record",
+    metavar="FILE.mcap",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Recording of the mission for Foxglove, Rerun and others.",
 )
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at.")
 @click.option(
@@ -79,6 +86,7 @@ BUDGET = 0.05
 def serve(
     mission: Path,
     journal: Path | None,
+    record: Path | None,
     host: str,
     port: int,
     token: str | None,
@@ -120,7 +128,7 @@ def serve(
             click.echo("note: without --journal, the mission ends with the server", err=True)
         path = journal or Path(folder, "mission.journal")
         running, kept = (_resumed if path.exists() else _begun)(
-            mission, path, settings, interpreter
+            mission, path, settings, interpreter, record
         )
         name = f"[{host}]" if ":" in host else host
         link = f"?token={who.operator}" if made_up else ""
@@ -138,7 +146,11 @@ def serve(
 
 
 def _begun(
-    mission: Path, path: Path, settings: dict[str, Any], interpreter: Callable[[], Interpreter]
+    mission: Path,
+    path: Path,
+    settings: dict[str, Any],
+    interpreter: Callable[[], Interpreter],
+    record: Path | None,
 ) -> tuple[Running, SqliteJournal]:
     """Make a mission ready and begin its journal; bad input leaves none behind."""
     import oath
@@ -146,12 +158,16 @@ def _begun(
     from oath.store.sqlite import SqliteJournal
 
     origin = Origin.of(mission, **settings)
-    running = _running(oath.load(mission), origin, interpreter)
+    running = _running(oath.load(mission), origin, interpreter, record)
     return running, SqliteJournal.create(path, origin)
 
 
 def _resumed(
-    mission: Path, path: Path, settings: dict[str, Any], interpreter: Callable[[], Interpreter]
+    mission: Path,
+    path: Path,
+    settings: dict[str, Any],
+    interpreter: Callable[[], Interpreter],
+    record: Path | None,
 ) -> tuple[Running, SqliteJournal]:
     """Open a journal and make its mission ready as it was."""
     from oath.errors import BadInput
@@ -170,13 +186,18 @@ def _resumed(
         if given != journal.origin:
             told = "goes on with the mission and settings it began with; others were given"
             click.echo(f"note: {path} {told}", err=True)
-        return _running(kept, journal.origin, interpreter), journal
+        return _running(kept, journal.origin, interpreter, record), journal
     except BaseException:
         journal.close()
         raise
 
 
-def _running(mission: Mission, origin: Origin, interpreter: Callable[[], Interpreter]) -> Running:
+def _running(
+    mission: Mission,
+    origin: Origin,
+    interpreter: Callable[[], Interpreter],
+    record: Path | None,
+) -> Running:
     from oath.allocate import Budget
     from oath.allocate import allocator as named
     from oath.scene import prepare, require_reachable
@@ -193,4 +214,11 @@ def _running(mission: Mission, origin: Origin, interpreter: Callable[[], Interpr
         budget=Budget(seconds=origin.seconds),
         seed=origin.seed,
         interpreter=interpreter,
+        recorder=None if record is None else _recorder(record, mission),
     )
+
+
+def _recorder(path: Path, mission: Mission) -> Recorder:
+    from oath.picture.recording import Recorder
+
+    return Recorder(path, mission)

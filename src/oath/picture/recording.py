@@ -93,6 +93,7 @@ class Recorder:
             ) from None
         if Path(path).exists():
             raise BadInput("exists already", file=str(path), remedy="name another file")
+        self._path = path
         self._context = context = foxglove.Context()  # its channels close when it is gone
         try:
             self._writer = foxglove.open_mcap(path, context=context)
@@ -172,8 +173,17 @@ class Recorder:
                 self.event(one)
 
     def close(self) -> None:
-        """Finish the file; without it readers must repair it first."""
-        self._writer.close()
+        """Finish the file; without it readers must repair it first.
+
+        Raises
+        ------
+        StoreError
+            If not all of it could be written, because the disk is full, say.
+        """
+        try:
+            self._writer.close()
+        except RuntimeError as error:
+            raise StoreError(f"{self._path}: the recording is not whole ({error})") from None
 
     def __enter__(self) -> Recorder:
         return self

@@ -10,6 +10,7 @@ import socket
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import uvicorn
 
@@ -32,13 +33,16 @@ from oath.service.snapshot import Moment
 from oath.service.talk import Talks
 from oath.store import Journal
 
+if TYPE_CHECKING:
+    from oath.picture.recording import Recorder
+
 LAST_WORDS = 0.3
 """Clients have so long to hear how a mission ended before the server goes [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Running:
-    """What a server runs: a mission made ready, and who assigns its tasks."""
+    """What a server runs: a mission made ready, who assigns its tasks, and what records it."""
 
     scene: Scene
     name: str
@@ -46,6 +50,7 @@ class Running:
     budget: Budget
     seed: int
     interpreter: Callable[[], Interpreter]
+    recorder: Recorder | None = None
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -89,7 +94,7 @@ def serve(
     Parameters
     ----------
     running
-        The mission.
+        The mission; its recording is finished in the end.
     journal
         Where it is kept; if it holds events already, the mission is resumed.
     listener
@@ -111,7 +116,8 @@ def serve(
         If the mission cannot begin, or had to stop.
     """
     server = _Server(running, journal, access, speed, until_done, rate)
-    asyncio.run(server.serve(listener, on_ready))
+    with running.recorder or contextlib.nullcontext():
+        asyncio.run(server.serve(listener, on_ready))
 
 
 class _Server:
@@ -179,13 +185,22 @@ class _Server:
     # -- called in the mission's thread
 
     def _begin(self, events: Sequence[AnyEvent], happen: Happen) -> Runtime:
+        if (recorder := self._running.recorder) is not None and events:
+            recorder.play(events)
         return begin(self._running, events, self._feed.history, happen)
 
     def happened(self, events: Sequence[AnyEvent], at: float) -> None:
         self._hand(lambda: self._feed.happened(events, at))
+        if (recorder := self._running.recorder) is not None:
+            for event in events:
+                recorder.event(event)
 
     def moved(self, poses: bytes, at: float) -> None:
         self._hand(lambda: self._feed.moved(poses, at))
+        if (recorder := self._running.recorder) is not None:
+            runtime = self._owner.runtime
+            now = {id: (*pose.at, pose.heading) for id, pose in runtime.poses().items()}
+            recorder.poses(runtime.now, now)
 
     def stands(self, moment: Moment, at: float) -> None:
         self._hand(lambda: self._feed.stands(moment, at))
