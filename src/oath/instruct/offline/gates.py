@@ -70,17 +70,19 @@ _NOT_AFTER_ALL = re.compile(
 
 _ASKS = re.compile(
     r"^(?:\W*(?:and|but|so|hey|hi|hello|ok|okay|well|um|sorry|please|now) )*"
-    r"(?:(?:is|are|was|were|does|did|has|had|why|who|whose|what|where|am)\b"
+    r"(?:(?:(?:is|are)(?! (?:new|now|one|some|also|more|another|big|urgent)\b(?!.*\?))|was|were|does"
+    r"|did|has|had|why|who|whose|what|where|am)\b"
     r"|how (?!about)|which (?!is\b)"
     r"|when (?:is|are|was|will|do|does|did|can|should)\b"
     r"|(?:do|have|should|shall|must|may|might) (?:you|we|i|they|it|he|she|the|a|any|robots|there"
     r"|somebody|someone|anyone|this|that)\b"
+    r"(?! (?:ask|request|trouble|bother|beg) you to\b)"
     r"|(?:should|shall|must|may|might)(?: the)? <\w+>)"
     r"|^(?:can|could|would|will|might|may) <robot>(?!.*\bplease\b)(?! (?:stop|wait|hold|pause"
     r"|continue|go|resume|proceed|stand|stay|halt|move|carry on|drive|start|freeze|be)\b)"
 )
 _ASKS_FOR = re.compile(
-    r"^(can|could|would|will) |\b(can|could|would|will|may|might) (you|we|i|somebody|someone"
+    r"^(can|could|would|will) |\bi (want|need|would (like|love|need))\b|\bask you to\b|\b(can|could|would|will|may|might) (you|we|i|somebody|someone"
     r"|<robot>|u|one|anybody|anyone)\b"
     r"|\b(would|do) you mind\b|\bwhy (not|do not we|do not you)\b|\bhow about\b|\bmind (\w+ing)\b"
     r"|\bpossible to\b|\blet us\b|\bshall we\b|\bplease\b"
@@ -94,12 +96,12 @@ _ASKS_ABOUT = re.compile(
 )
 
 _IF = re.compile(
-    r"\b(if|unless|until(?! further| later| the end| last)|till(?! further| later| the end"
-    r"| last)|(?<!at )once|whenever"
+    r"\b(if|unless|until(?! further| later| the (?:very )?end| last| every| all)"
+    r"|till(?! further| later| the (?:very )?end| last| every| all)|(?<!at )once|whenever"
     r"|in case|in the event|provided|assuming|assume|suppose|supposing"
     r"|imagine|as long as|except|depending|otherwise|in order of|pending)\b"
     r"|\b(when|after|while|as soon as|before)(?= (the |a |my |our )?(<\w+>|(?:i|you|we|it|he|she"
-    r"|they|(?!\w+thing)\w+ing"
+    r"|they|(?!\w+thing|bring)\w+ing"
     r"|someone|people|lunch|dinner|breakfast|sunset|shift|\w+ (is|are|has|have|arrives?|comes?"
     r"|goes|leaves?"
     r"|returns?|starts?|ends?|opens?|closes?))\b))"
@@ -109,6 +111,10 @@ _IF_POLITE = re.compile(
     r" ?(can|could|would|may|like|please|want|wish|get|have|are|possible|convenient|time|ready"
     r"|free|do"
     r" not mind|need be|a (chance|moment|minute|second))\b"
+    r"|\bif (it|that|this) (is|would be|be) (ok|okay|all right|alright|fine|possible|convenient"
+    r"|no (trouble|bother|problem)|not too (much|late)[a-z ]*|good|acceptable|allowed)\b"
+    r"|\bif (i may|you please|you would|you will|you do not mind|that suits you)\b"
+    r"|\b(when|while|as) (i|we) (was|were) \w+ing\b"
     r"|\b(in case you (missed|have not)|as soon as possible|when (you )?(have|get|find) (a|the"
     r"|some)"
     r" (chance|time|moment|minute))\b|\b(when|while) (everything|all) (else|others) (is"
@@ -127,7 +133,7 @@ _TOLD = re.compile(
 _TOLD_BY_ME = re.compile(r"\b(as )?i (said|told you|mentioned|already said)\b")
 
 _PAST = re.compile(
-    r"\b(yesterday|last (week|night|month|time|year|monday|friday)|ago|earlier today|this morning"
+    r"\b((?<!from )yesterday|last (week|night|month|time|year|monday|friday)|ago|earlier today|(?<!from )this morning"
     r"|previously|used to|(?:we|i|they) had|had been|formerly|back then|the other day|once upon"
     r"|on monday"
     r"|in the past)\b"
@@ -168,7 +174,7 @@ _OR = re.compile(
     r"(<\w+>) (,|\?)? ?or (the |to |at |in |from |rather |point |room |station |task "
     r"|maybe )*(<\w+>)"
     r"|\b(either|any of|one of (?:them|these|those)|whichever|some other|somewhere|someplace"
-    r"|anywhere)\b"
+    r"|(?<!going )(?<!go )anywhere)\b"
 )
 
 _COMPARES = re.compile(
@@ -192,7 +198,7 @@ _LIMITS = re.compile(
 _NO_LIMIT = re.compile(
     r"\b(for|hold on|wait|stop|pause) (a|one|some|few|a few) (minutes?|seconds?|moment|hours?)\b"
     r"|\b(a|one|this) (minute|second|moment|sec|min)\b|\bmost (?:urgent|important)\b"
-    r"|\bat all times\b"
+    r"|\bat all times\b|\b(checked|looked|tried|asked|called|tested) (\w+ )?(twice|\w+ times)\b"
 )
 
 _UNITS = re.compile(
@@ -277,6 +283,10 @@ def _is_denied(line: str, intent: str) -> bool:
         rest = re.sub(r"\b(no|not) (way|passage|access|go|entry|through\w*|there|yet)\b", " ", rest)
         if re.search(r"\bthere is no\b|\bno (<kind>|obstacle|wall|blockage)\b", rest):
             return True
+    if intent == "robot_failed":
+        rest = re.sub(r"\bnot (\w+ )?(mov|go|driv|work|run|start|react|answer)\w*\b", " ", rest)
+    if intent == "cancel_task":
+        rest = re.sub(r"\bnot do (the )?(task |job |order )?<label>[ .!]*$", " ", rest)
     if intent == "pause_robot":
         rest = re.sub(
             r"\b(do|must|should|may) not (let )?(<robot> )?(move|go|drive|continue)\b", " ", rest
@@ -335,6 +345,7 @@ def speaks_against(line: str, intent: str) -> bool:
         return "<kind>" not in line
     pattern = _AGAINST.get(intent)
     if intent in ("obstacle_update", "robot_failed"):
+        line = re.sub(r"\b(say|get|up|move|start|boot|work|drive|go) again\b", " ", line)
         line = re.sub(r"\b(not|no|never|cannot|no longer) (\w+ )?(\w+)\b", " ", line)
         line = re.sub(
             r"\b(needs?|must|has to|had to|out|beyond|to be|in) (\w+ )?(repair\w*|fix\w*)\b",

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from oath.commands import COMMANDS, Command
 from oath.instruct import Reply
-from oath.instruct.offline import gates, questions, slots
+from oath.instruct.offline import clear, gates, questions, slots
 from oath.instruct.offline.heard import Filled, Heard
 from oath.instruct.offline.tokens import Token
 
@@ -106,6 +106,9 @@ def _one(heard: Heard) -> Reply:
         kept = None if "not to do" in denied else meant.intent
         say = f"{denied} Say it plainly if I shall {ABOUT[meant.intent]}."
         return Reply(status="clarification", intent=kept, message=say)
+    if why := clear.unclear(heard.line, meant.intent):
+        say = f"{why} Say it plainly if I shall {ABOUT[meant.intent]}."
+        return Reply(status="clarification", intent=meant.intent, message=say)
     if why := _in_one(heard, meant.intent):
         return Reply(status="clarification", intent=meant.intent, message=why)
     odd = len(gates.strange(heard.tokens, heard.models.words)[0])

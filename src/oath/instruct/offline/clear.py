@@ -1,0 +1,223 @@
+"""What an instruction must say to be acted on: words that mean it, and none that take it back.
+
+The model tells which command is the most likely; here its words are held against the classes of
+English that change what is meant: verbs, auxiliaries, adverbs of degree and frequency, quantifiers.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+_SAYS: Mapping[str, str] = {
+    "cancel_task": (
+        r"cancel\w*|drop\w*|delet\w*|remov\w*|abort\w*|scrap\w*|scrub\w*|discard\w*|kill\w*"
+        r"|scratch\w*|call\w* (\w+ |<\w+> ){0,3}off|withdr\w+|void\w*|bin|dismiss\w*|terminat\w*"
+        r"|revok\w*|eras\w*|abandon\w*|annul\w*|ditch\w*|rid|tak(e|en|ing) (task |job |order )?"
+        r"(\w+ |<\w+> )?(out|off|away|back)|str(ike|uck)|forget|retract\w*|no longer"
+        r"|any ?(more|longer)|not (\w+ ){0,2}(need\w*|do|bother|doing|required|wanted|want|worry"
+        r"|happen\w*)|no (need|use|point)|unneeded|unnecessary|needless|redundant|superfluous"
+        r"|obsolete|pointless|skip\w*|nix|axe[d]?|exclud\w*|leave (\w+ |<\w+> ){0,2}(out|undone"
+        r"|alone)|cut|rm|dump\w*|pull\w*|purg\w*|off the (\w+ )?(list|table|plan|books|board|menu"
+        r"|schedule)|moot|out of the (plan|list|queue|schedule)|shelv\w*|stand down|chuck|toss"
+        r"|eliminat\w*|disregard|ignor\w*|rescind\w*|without|after all|lose|gone|dead|wipe\w*"
+    ),
+    "robot_failed": (
+        r"fail\w*|brok\w*|break\w* down|breakdown|dead|di(ed|es)|defect\w*|kaput\w*|crash\w*"
+        r"|out of (order|service|action|commission|operation|use|the game|play|the mission)|lost"
+        r"|toast|malfunction\w*|wreck\w*|tipped|overturned|toppled|f(e|a)ll(en)? over"
+        r"|(write|wrote|written|writing|count|rule|take|taken|knocked|strike|struck|leave) .*"
+        r"(off|out)|(not|no longer|stopped|never|without|cannot) (\w+ ){0,3}(work\w*|function\w*"
+        r"|operat\w*|mov\w*|run\w*|driv\w*|boot\w*|start\w*|go\w*|us\w+|count\w*|get up|rely"
+        r"|available|continue|usable|power)|burn\w*|brick\w*|conked|g(i|a)ven? up|smok\w*|fire"
+        r"|useless|unusable|unserviceable|unavailable|inoper\w*|incapacitated|disabled|damag\w*"
+        r"|casualt\w*|finished|done for|crapped|bust\w*|ruined|(is|went|has gone|gone) down|down"
+        r"|(is|are|s) out|offline|off-line|gone|collaps\w*|defunct|unresponsive|stuck|wrong with"
+        r"|shot|fried|jammed|written|lifeless|(lost|no|out of) (power|battery|wheel)"
+    ),
+    "undo": (
+        r"und[oi]\w*|revers\w*|revert\w*|roll\w*( \w+){0,3} back|rollback|unmake|rewind\w*"
+        r"|restor\w*|ctrl.*|(take|taking|put|set|go|turn|switch|chang\w*|step|back)( \w+){0,6} back"
+        r"|back out|as (it|they|things) (was|were)|way (it|they|things) (was|were)|previous state"
+        r"|last (change|command|instruction|action|edit|order|step)"
+    ),
+    "remove_obstacle": (
+        r"remov\w*|delet\w*|clear\w*|eras\w*|tak(e|en|ing) (\w+ |<\w+> ){0,3}(away|off|out|down"
+        r"|back)|took|drop\w*|rid|unmark\w*|wip\w*|discard\w*|gone|no (longer|more)"
+        r"|any ?(more|longer)|away|dismantl\w*|lift\w*|clean\w*|open\w*|free\w*|disappear\w*"
+        r"|vanish\w*|torn|demolish\w*|pulled|unblock\w*|moved|rm|strike|scratch|cancel\w*|passable"
+        r"|pass|picked up|forget|carried|collected|out of the way|outta|out there|disregard"
+        r"|undone|left|fixed|down|off the|mopped|swept|towed|scrap|history|ignore"
+    ),
+    "pause_robot": (
+        r"stop\w*|paus\w*|hold\w*|halt\w*|freez\w*|frozen|wait\w*|park\w*|stay\w*|stand\w*|still"
+        r"|suspend\w*|brak\w*|whoa|not (let )?(\w+ |<robot> )?(mov\w*|go|driv\w*|budge|continue"
+        r"|proceed|leave|do anything)|hang|rest|immobili\w*|stall\w*|keep|remain\w*|ceas\w*|tight"
+        r"|break|pull over|pin|put|a moment|a second|a minute|stationary|e-stop|pull|quit"
+    ),
+    "resume_robot": (
+        r"resum\w*|restart\w*|continu\w*|unpaus\w*|releas\w*|unfreez\w*|unhold|wak\w*|reactivat\w*"
+        r"|start\w*|un-\w+|unblock\w*|unpark\w*|let|go\w*|proceed\w*|carry|free\w*|mov\w*|driv\w*"
+        r"|roll\w*|again|back|green|work\w*|on|off|up|may|can|clear\w*|unlock\w*|set|activ\w*"
+    ),
+}
+_EVIDENCE = {intent: re.compile(rf"(?<![\w<])(?:{words})(?![\w>])") for intent, words in _SAYS.items()}
+
+_NEGATED = re.compile(
+    r"\b(not|never|hardly|barely|nearly|almost|scarcely|half|partly|partially|without|neither|nor"
+    r"|far from|close to|about to)( been| being| quite| yet| really| actually| all| entirely"
+    r"| completely| fully| to| have| has| a| the| be)*$"
+)
+"""Just before what an instruction means, it takes it back."""
+
+_STATES = ("robot_failed", "remove_obstacle")
+"""Intents that tell how things are."""
+
+_META = re.compile(
+    r"^(?:\W|please |kindly |now |can you |could you |would you |ok |hey )*(?:write|repeat|print"
+    r"|translate|sing|spell|recite|compose|pronounce|rephrase|paraphrase|echo|output|rhyme|tell me a"
+    r"|tell a|say (?:that|after|the|aloud|to|:|\")|read|rewrite|reply|respond|answer|guess|define"
+    r"|quote|invent|make up|joke|dream)\b(?! (?:off|out)\b)|\bafter me\b"
+    r"|\b(?:poem|song|joke|story|haiku|rhyme|essay|french|german|spanish|english|latin)\b"
+)
+_SAID = re.compile(
+    r"\b(they|people|some|folks|everybody|everyone|somebody|someone|he|she|one|colleagues?|<robot>"
+    r"|(?:the|my|our|your|a|an|this|that|his|her) \w+(?: \w+)?) (?:always |also |just |still |now |"
+    r"all )?(say|says|think|thinks|believes?|claims?|suggest\w*|recommend\w*|propos\w+|hopes?"
+    r"|hoped|wish\w*|feels?|felt|guess\w*|argue\w*|warn\w*|complain\w*|assum\w+|expects?|expected"
+    r"|predict\w*|fears?|feared|doubts?|denie[sd]|deny|swears?|swore|thought|knew|dream\w*)\b"
+)
+_PLANNED = re.compile(
+    r"\b(is|are|am|was|were|be) (also |just |now |all )?(going|about|planning|meant|hoping"
+    r"|intending|supposed|due|scheduled|expected|bound|likely|set|tempted|inclined) to "
+    r"(?!be (brought|taken|carried|delivered|moved|picked|fetched|collected)\b)(?!need\b)"
+    r"(?!the\b)(?!move\b)[a-z]+\b"
+    r"|\b(plan|plans|planned|intend\w*|mean|meant|hope|hoped|aim|wanted|tried|try|tend|used)"
+    r" (for \w+ )?to\b|\bought to\b|\b(some|one|any) day\b|\beventually\b|\bin (the )?future\b"
+    r"|\bnext (week|month|year|time|monday|tuesday|wednesday|thursday|friday|shift)\b"
+    r"|\b(i|we) (would|could|might) (?!like|love|prefer|appreciate|be (grateful|glad|happy|obliged"
+    r"|delighted)|need|want|rather|ask|please|also|really|not|use|have|just)\b"
+    r"|\b(would|could|should|might|must|may|ought to) have\b(?! (it|that|this|to|a|an|the|some"
+    r"|<\w+>|one|high|low|priority|been ordered))"
+    r"|\bif (only|i were|it were|we were)\b|\bwere (it|i|we)\b|\bwish\b|\bdreamt?\b|\b(later today"
+    r"|later on|this (afternoon|evening)|overnight)\b"
+)
+_WILL_BE = re.compile(
+    r"\b(there|they|it|that|<\w+>|someone|somebody|we|he|she|\w+s) (will|would|shall|may|might"
+    r"|could|should) (\w+ )?(be|build|put|have|fail|break|die|need|go|stand|appear|come|arrive"
+    r"|install|erect|close|block|remove|clear|take|mount|place|park|set)\b"
+    r"|\b(somebody|someone|they|we|you|one|anyone|nobody) (ought|should|could|needs?|must|has|have"
+    r"|had)( to)? \w+"
+)
+_PASSABLE = re.compile(
+    r"\b(\w+ )(will|would|shall|may|might|could|should|must|needs?|have|has)( to)? (not|have to"
+    r"|need to|drive|go|get|find|take a|use|avoid|detour|route|stay|be (marked|added|avoided"
+    r"|entered|treated|considered|able|closed off|removed|deleted|taken|cleared|erased|wiped))\b"
+)
+_OFTEN = re.compile(
+    r"\b(always|usually|often|sometimes|generally|typically|rarely|seldom|occasionally|mostly"
+    r"|frequently|ever since|every now and then|now and then|from time to time|on occasion"
+    r"|regularly)\b"
+)
+_DEGREE = re.compile(
+    r"\b(nearly|almost|hardly|barely|scarcely|partly|partially|half-?way|practically"
+    r"|virtually|semi-?\w*|just about|more or less|sort of|kind of)\b"
+)
+_BITS = re.compile(
+    r"\b(a (little|tiny|wee|small)?( bit)?|slightly|somewhat|a tad|a touch|(a|one|two) (notch\w*"
+    r"|levels?|steps?|places?|positions?|slots?|points?)|by one|by two|by \d+)(?= ?[.,!;]?$| (more|"
+    r"less|higher|lower|up|down|later|earlier|sooner|faster|please|only|bit)\b)"
+    r"|\b(a bit|a little|slightly|somewhat|a tad|a notch)\b"
+)
+_BIGGER = re.compile(
+    r"\b(\w{2,}er|more \w+|less \w+|worse|further|farther) than (we|i|it|they|you|expected|thought"
+    r"|before|usual|planned|that|this|the)\b|\b(move|moved|shift|shifted|extend|extends|extended"
+    r"|grow|grown|shrink|shrunk|turn|rotate|resize|enlarge|lengthen|shorten)\b (the|that|this|our"
+    r"|<\w+>)"
+)
+_ALL = re.compile(
+    r"\b(everything|anything|all|every|each|others?|rest|both|some|most|many|several|few|half"
+    r"|any|none|either|two|three|four)\b(?! (?:right|set|done|good|the same|of a sudden))"
+)
+_WHERE = re.compile(
+    r"\b(at|in|near|before|after|behind|by|beside|until|on reaching|in front of|next to|outside"
+    r"|inside|close to|towards|to) (the |your |its |room |point |station |place )*<(place|point)>"
+)
+_LESS = re.compile(
+    r"\b(low|slow\w*|weak|acting|strange|odd|oddly|weird\w*|funny|soon|late|lagging|wobbl\w*|noisy"
+    r"|behaving|behaves|misbehav\w*|tired|sluggish|squeak\w*|charging|recharg\w*|warm|hot|dirty"
+    r"|failed to (?!start|boot|move|restart|come back|come up|power)\w+|favou?rite|struggl\w*"
+    r"|flickers?|hesitat\w*|shak\w+|delay\w*|battery is)\b"
+)
+_GONE_OFF = re.compile(
+    r"\b(dead|died|dies|broke\w*|fail(ed)?(?! to)|crash\w*|burn\w*|wreck\w*|out of (order|service"
+    r"|action)|write|written|count|consider|kaput\w*|toast|finished|bust\w*|empty|flat)\b"
+)
+
+_ASKED = re.compile(
+    r"\?|^(?:\W|so |and |hey |hi |hello |please |well |ok |okay |now |just |sorry |then )*(?:how|what"
+    r"|where|which|who|when|is|are|do|does|did|has|have|can|could|would|will|may|show|tell|give|list"
+    r"|report|status|let|check|read|describe|summari[sz]e|explain|i)\b"
+    r"|\b(status|progress|report|update|summary|overview|sitrep|state|tell|show|news|list|know"
+    r"|brief|rundown|recap|inform|see|stand|eta|situation)\b"
+)
+_OF_MISSION = re.compile(
+    r"<(robot|label|place|point|obstacle|unknown_\w+)>|\b(status|progress\w*|robots?|tasks?|jobs?"
+    r"|orders?|deliver\w*|far|things|going(?! to)|doing|done|left|remain\w*|report\w*|updates?"
+    r"|summary|overview|state|situation|sitrep|finish\w*|busy|eta|scoop|rundown|plan|schedule"
+    r"|happen\w*|news|mission|fleet|everyone|everybody|everything|we|obstacles?|blocked|idle|open"
+    r"|pending|waiting|queue|complete\w*|paused|brief\w*|recap|walls?|units?|bots?|stopped|shape"
+    r"|latest|coming along|it go|up to|board|working)\b"
+)
+_MEANING = re.compile(
+    r"\b(mean|means|meaning|definition|called|define|spell\w*|rain\w*|weather|heavy|weigh\w*|cost"
+    r"|costs|price|old|tall|wide|how (do|can|could|would|should|to)( i| we| one| you)?|why"
+    r"|what (happens|would|will|can|could|if)|who|whose|colou?r|favou?rite|lunch|coffee|ceo|made of"
+    r"|invented|built|kind of|sort of|name|time is|date|day is)\b(?! (are|is) we\b)"
+)
+
+
+def unclear(line: str, intent: str) -> str | None:
+    """Why the words of a likely instruction do not say clearly what is to be done."""
+    if _META.search(line) and intent != "query_status":
+        return "I take instructions about the mission only, so I change nothing."
+    if intent == "query_status":
+        fair = _ASKED.search(line) and _OF_MISSION.search(line) and not _MEANING.search(line)
+        return None if fair else "I can tell how the mission stands, and nothing else."
+    if _SAID.search(line):
+        return "That is what somebody else says, so I change nothing."
+    if _PLANNED.search(line):
+        return "That is not so now, so I change nothing yet."
+    if _OFTEN.search(line):
+        return "That is how it often is, so I change nothing."
+    if intent in (*_STATES, "obstacle_update") and _WILL_BE.search(_PASSABLE.sub(" ", line)):
+        return "That is not so yet, so I change nothing."
+    if _DEGREE.search(line):
+        return "You say that it is not quite so, so I change nothing."
+    return _of_one(line, intent)
+
+
+def _of_one(line: str, intent: str) -> str | None:
+    """What is unclear about one intent in particular."""
+    if intent in _EVIDENCE:
+        found = list(_EVIDENCE[intent].finditer(line))
+        if not found:
+            return "I am not sure what is to be done."
+        if intent in _STATES and all(_NEGATED.search(line[: one.start()].rstrip()) for one in found):
+            return "You say that it is not so, so I change nothing."
+    match intent:
+        case "undo" if _ALL.search(line) or re.search(r"\b(since|first|from|last \w+s)\b", line):
+            return "I undo the last change only. Say 'undo the last change' if that is meant."
+        case "cancel_task" if re.search(r"\b(everything|anything|others?|rest)\b", line):
+            return "I cancel tasks by their labels only."
+        case "cancel_task" if re.search(r"\b(not|no longer) (\w+ )?wait\b", line):
+            return "Is it to be cancelled or to be done first?"
+        case "change_task_priority" if _BITS.search(line):
+            return "I know low, normal and high priority only."
+        case "obstacle_update" if _BIGGER.search(line):
+            return "I cannot change an obstacle; remove it and add it anew."
+        case "pause_robot" if _WHERE.search(line):
+            return "I can stop a robot where it is now, not at a place."
+        case "robot_failed" if _LESS.search(line) and not _GONE_OFF.search(line):
+            return "Is it out of service? Say 'robot1 has failed' if it is."
+    return None
