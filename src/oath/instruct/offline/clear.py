@@ -45,9 +45,25 @@ _SAYS: Mapping[str, str] = {
         r"remov\w*|delet\w*|clear\w*|eras\w*|tak(e|en|ing) (\w+ |<\w+> ){0,3}(away|off|out|down"
         r"|back)|took|drop\w*|rid|unmark\w*|wip\w*|discard\w*|gone|no (longer|more)"
         r"|any ?(more|longer)|away|dismantl\w*|lift\w*|clean\w*|open\w*|free\w*|disappear\w*"
-        r"|vanish\w*|torn|demolish\w*|pulled|unblock\w*|moved|rm|strike|scratch|cancel\w*|passable"
+        r"|vanish\w*|torn|demolish\w*|pulled|unblock\w*|moved (it |them )?(away|out|aside|off|elsewhere|to the side)|rm|strike|scratch|cancel\w*|passable"
         r"|pass|picked up|forget|carried|collected|out of the way|outta|out there|disregard"
         r"|undone|left|fixed|down|off the|mopped|swept|towed|scrap|history|ignore"
+    ),
+    "obstacle_update": (
+        r"block\w*|clos\w*|impass\w*|obstruct\w*|shut|cut off|cordon\w*|passable|off ?-?limits"
+        r"|out of bounds|inaccessible|unusable|barred|sealed|(there|here|this|that|it|now|way|which) "
+        r"(is|are|stands?|lies|sits)|now|appear\w*|mark\w*|add|put|draw|register|report\w*|new"
+        r"|found|detect\w*|discover\w*|identif\w*|spott\w*|see|seen|saw|sight\w*|sens\w*|notic\w*"
+        r"|stand(s|ing)|ly?ing|lies|laid|left|plac\w*|buil[dt]|erect\w*|install\w*|f[ea]ll\w*"
+        r"|spill\w*|tipped|collaps\w*|no (\w+ )?(entry|access|way|through\w*|passage|go|driving|entering)"
+        r"|forbidden|prohibited|keep (out|clear|away)|avoid|in the way|reach(es|ing)|stretch\w*"
+        r"|span\w*|occup\w*|cover\w*|head\w* up|beware|careful|watch|caution|warning|got|have|has"
+        r"|corners?|polygon|dump\w*|dropp\w*|park\w*|jamm\w*|denied|stuck|creat\w*|enter|log"
+        r"|set|includ\w*|insert|map|(not|cannot|no longer|nobody|no one|no robot|nothing|none) "
+        r"(\w+ ){0,3}(pass\w*|cross\w*|us\w+|driv\w*|go|get\w*|through|enter\w*|travers\w*"
+        r"|accessible|free|clear|open|available|navigable|reachable)|going up|gone up|set up|came up"
+        r"|come up|pop\w*|note|ends?|finish\w*|across|starts?|begin\w*|consider"
+        r"|treat|declare|place|record|went up|sprung|emerged|turned up|locate\w*|crosses|runs"
     ),
     "pause_robot": (
         r"stop\w*|paus\w*|hold\w*|halt\w*|freez\w*|frozen|wait\w*|park\w*|stay\w*|stand\w*|still"
@@ -73,6 +89,31 @@ _NEGATED = re.compile(
 _STATES = ("robot_failed", "remove_obstacle")
 """Intents that tell how things are."""
 
+_NOBODY = re.compile(
+    r"\b(nobody|no one|noone|nothing|none|neither)( has| have| had| is| are| was| should| must| may"
+    r"| will| can| could| would| ever| yet| really| to| be| dare| needs?)* (cancel|stop|paus|block"
+    r"|remov|delet|fail|broke|resum|releas|undo|rais|lower|prioriti|add|deliver|bring|halt|hold"
+    r"|clear|drop|obstruct|touch|wants?)\w*"
+)
+_GERUND = re.compile(
+    r"^\W*(cancell?|paus|stopp|hold|add|rais|lower|remov|delet|resum|clos|block|bring|tak|mov|undo"
+    r"|mark|deliver|prioriti[sz]|dropp|halt|abort|restart|chang|revert|do|put|mak|giv)ing [^.!;]*\b(would|could|might|will|may|is|was|costs?|takes?|took|means?"
+    r"|seems?|annoys?|hurts?|helps?|makes?|makes no|had|has)\b"
+)
+_REPORTS = re.compile(
+    r"<robot> (\w+ly |just |already |also |now )?(stops|stopped|waits|waited|holds|held|pauses|paused"
+    r"|halts|halted|stood|keeps|stays|stayed|parks|parked|rests|freezes|froze|resumed|resumes"
+    r"|continues|continued|went|drives|drove|moves|moved|(is|was|got|has been|had been|are|were) "
+    r"(\w+ )?(stopped|stopping|waiting|paused|standing|parked|halted|held|on hold|still|moving"
+    r"|driving|running|released|resumed))\b|\bdid <robot>"
+)
+_NOT_THIS = re.compile(r"\b(not|never) <(label|robot|obstacle|point|place)>")
+_TELLS_OF = re.compile(
+    r"^\W*(the|this|that|our|my|a|an) (\w+ )?<kind> (from|between|at|along)\b.*<point>.*?"
+    r"\b(was|were|could|might|may|should|would|needs?|has been (painted|checked|repaired|inspected))"
+    r"\b|\b(drove|walked|went|drives|drive|goes|moved|ran) (along|past|by|around|over|from|through)\b"
+)
+
 _META = re.compile(
     r"^(?:\W|please |kindly |now |can you |could you |would you |ok |hey )*(?:write|repeat|print"
     r"|translate|sing|spell|recite|compose|pronounce|rephrase|paraphrase|echo|output|rhyme|tell me a"
@@ -88,7 +129,8 @@ _SAID = re.compile(
     r"|predict\w*|fears?|feared|doubts?|denie[sd]|deny|swears?|swore|thought|knew|dream\w*)\b"
 )
 _PLANNED = re.compile(
-    r"\b(is|are|am|was|were|be) (also |just |now |all )?(going|about|planning|meant|hoping"
+    r"(?<!would )(?<!'d )\b(likes?|loves?|prefers?|enjoys?|hates?|refuses?) (to|\w+ing)\b|\bkee?p(s|t) "
+    r"(on )?\w+ing\b|\b(is|are|am|was|were|be) (also |just |now |all )?(going|about|planning|meant|hoping"
     r"|intending|supposed|due|scheduled|expected|bound|likely|set|tempted|inclined) to "
     r"(?!be (brought|taken|carried|delivered|moved|picked|fetched|collected)\b)(?!need\b)"
     r"(?!the\b)(?!move\b)[a-z]+\b"
@@ -106,8 +148,8 @@ _WILL_BE = re.compile(
     r"\b(there|they|it|that|<\w+>|someone|somebody|we|he|she|\w+s) (will|would|shall|may|might"
     r"|could|should) (\w+ )?(be|build|put|have|fail|break|die|need|go|stand|appear|come|arrive"
     r"|install|erect|close|block|remove|clear|take|mount|place|park|set)\b"
-    r"|\b(somebody|someone|they|we|you|one|anyone|nobody) (ought|should|could|needs?|must|has|have"
-    r"|had)( to)? \w+"
+    r"|\b(somebody|someone|they|we|you|one|anyone|nobody) (ought to|should|could|needs? to|must"
+    r"|has to|have to|had to) \w+"
 )
 _PASSABLE = re.compile(
     r"\b(\w+ )(will|would|shall|may|might|could|should|must|needs?|have|has)( to)? (not|have to"
@@ -146,11 +188,11 @@ _WHERE = re.compile(
 _LESS = re.compile(
     r"\b(low|slow\w*|weak|acting|strange|odd|oddly|weird\w*|funny|soon|late|lagging|wobbl\w*|noisy"
     r"|behaving|behaves|misbehav\w*|tired|sluggish|squeak\w*|charging|recharg\w*|warm|hot|dirty"
-    r"|failed to (?!start|boot|move|restart|come back|come up|power)\w+|favou?rite|struggl\w*"
+    r"|failed (its|his|her|the|at|on|<\w+>|to (?!start|boot|move|restart|come|power))|favou?rite|struggl\w*"
     r"|flickers?|hesitat\w*|shak\w+|delay\w*|battery is)\b"
 )
 _GONE_OFF = re.compile(
-    r"\b(dead|died|dies|broke\w*|fail(ed)?(?! to)|crash\w*|burn\w*|wreck\w*|out of (order|service"
+    r"\b(dead|died|dies|broke\w*|fail(ed)?(?! (to|its|his|her|the|at|on|<\w+>)\b)|crash\w*|burn\w*|wreck\w*|out of (order|service"
     r"|action)|write|written|count|consider|kaput\w*|toast|finished|bust\w*|empty|flat)\b"
 )
 
@@ -177,6 +219,16 @@ _MEANING = re.compile(
 )
 
 
+_TERSE = re.compile(
+    r"(?:\W|\d|please |over |ok |obstacle |obstruction |barrier |blockage |object |thing |a |an |the "
+    r"|from |to |between |and |at |along |through |until |til |till |up |down |of |with |points? "
+    r"|line |id |type |kind |control |team |attention |copy |hey |hi |also |plus |then |be advised |passage |aisle |corridor |route |way |path |long "
+    r"|area |zone |line |segment |running |runs |go(?:es|ing) |<\w+> ?)*"
+    r"(?:over|please|thanks|obstacle|out|copy)?\W*"
+)
+"""Says no more than what and where."""
+
+
 def unclear(line: str, intent: str) -> str | None:
     """Why the words of a likely instruction do not say clearly what is to be done."""
     if _META.search(line) and intent != "query_status":
@@ -192,6 +244,10 @@ def unclear(line: str, intent: str) -> str | None:
         return "That is how it often is, so I change nothing."
     if intent in (*_STATES, "obstacle_update") and _WILL_BE.search(_PASSABLE.sub(" ", line)):
         return "That is not so yet, so I change nothing."
+    if _NOBODY.search(line) or _GERUND.search(line):
+        return "You say what not to do, or what it would be like, so I change nothing."
+    if len(re.findall(r"<(label|robot|obstacle|point|place)>", line)) > 1 and _NOT_THIS.search(line):
+        return "One at a time, please; I change nothing yet."
     if _DEGREE.search(line):
         return "You say that it is not quite so, so I change nothing."
     return _of_one(line, intent)
@@ -201,11 +257,13 @@ def _of_one(line: str, intent: str) -> str | None:
     """What is unclear about one intent in particular."""
     if intent in _EVIDENCE:
         found = list(_EVIDENCE[intent].finditer(line))
-        if not found:
+        if not found and not _TERSE.fullmatch(line):
             return "I am not sure what is to be done."
         if intent in _STATES and all(_NEGATED.search(line[: one.start()].rstrip()) for one in found):
             return "You say that it is not so, so I change nothing."
     match intent:
+        case "undo" if re.search(r"\bbut\b|<(?!number)\w+>", line):
+            return "I undo the last change only. Say 'undo the last change' if that is meant."
         case "undo" if _ALL.search(line) or re.search(r"\b(since|first|from|last \w+s)\b", line):
             return "I undo the last change only. Say 'undo the last change' if that is meant."
         case "cancel_task" if re.search(r"\b(everything|anything|others?|rest)\b", line):
@@ -214,6 +272,12 @@ def _of_one(line: str, intent: str) -> str | None:
             return "Is it to be cancelled or to be done first?"
         case "change_task_priority" if _BITS.search(line):
             return "I know low, normal and high priority only."
+        case "obstacle_update" if _TELLS_OF.search(line):
+            return "Is it in the way now? Say 'there is a wall from (7, 5) to (8, 5)' if it is."
+        case "pause_robot" | "resume_robot" if _REPORTS.search(line):
+            return "You say what a robot does or did, so I change nothing."
+        case "remove_obstacle" if _BITS.search(line):
+            return "I can take an obstacle off the map, and not move it."
         case "obstacle_update" if _BIGGER.search(line):
             return "I cannot change an obstacle; remove it and add it anew."
         case "pause_robot" if _WHERE.search(line):

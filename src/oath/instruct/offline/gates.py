@@ -133,7 +133,8 @@ _TOLD = re.compile(
 _TOLD_BY_ME = re.compile(r"\b(as )?i (said|told you|mentioned|already said)\b")
 
 _PAST = re.compile(
-    r"\b((?<!from )yesterday|last (week|night|month|time|year|monday|friday)|ago|earlier today|(?<!from )this morning"
+    r"\b((?<!from )yesterday|last (week|night|month|time|year|spring|summer|autumn|fall|winter|shift|"
+    r"season|quarter|monday|tuesday|wednesday|thursday|friday|saturday|sunday)|ago|earlier today|(?<!from )this morning"
     r"|previously|used to|(?:we|i|they) had|had been|formerly|back then|the other day|once upon"
     r"|on monday"
     r"|in the past)\b"
@@ -212,6 +213,28 @@ _UNITS = re.compile(
 
 _NO_OTHER = re.compile(r"\b(nothing|no|none)( \w+){1,6} (than|as) <label>")
 """Says that one comes before all others."""
+
+
+_REST_WAITS = re.compile(
+    r"((and|but|while|,|;|\.) )*(everything|all|anything|every\w+|the|all the|the other|our)"
+    r"( (else|others?|rest|tasks?|jobs?|orders?))* (can|may|must|has to|have to|should|will|could)"
+    r" (wait|come (later|after\w*|second)|be done (later|after\w*)|follow|be left)( till later)?"
+    r"|^\W*drop everything( else)? (and|,|;|for)( (do|handle|take|get|deal with))?"
+)
+
+
+def without_rest(tokens: Sequence[Token]) -> tuple[Token, ...]:
+    """Read ``everything else can wait`` as that what is named comes first."""
+    line = as_line(tokens)
+    found = _REST_WAITS.search(line)
+    if found is None or "<label>" not in line.replace(found[0], " "):
+        return tuple(tokens)
+    begin = line[: found.start()].count(" ")
+    end = begin + found[0].count(" ") + 1
+    first = [Token("word", one, None, one) for one in ("do", "first")]
+    if begin == 0:
+        return (first[0], *tokens[end:], first[1])
+    return (*tokens[:begin], first[1], *tokens[end:])
 
 
 def refused(line: str) -> str | None:

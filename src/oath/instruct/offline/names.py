@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from functools import lru_cache
 
 from oath.commands import Live
+from oath.instruct.offline.axes import read_axes
+from oath.instruct.offline.spelling import mended, spelled
 from oath.instruct.offline.tokens import Token, clean, lex, read_numbers, read_points
 
 NOUNS = {
@@ -144,11 +146,11 @@ class Names:
     obstacles: Mapping[str, str]
     kinds: Mapping[str, str]
     types: Mapping[str, str]
-    words: Container[str] = frozenset()
+    words: frozenset[str] = frozenset()
     """Words of everyday instructions: a name that is one of them needs a noun in front."""
 
     @classmethod
-    def of(cls, live: Live, words: Container[str] = frozenset()) -> Names:
+    def of(cls, live: Live, words: frozenset[str] = frozenset()) -> Names:
         """The names of the live world."""
         state, mission = live.state, live.scene.mission
         kinds = {one.kind for one in (*state.obstacles.values(), *state.hidden.values())}
@@ -197,8 +199,9 @@ def tag(text: str, names: Names) -> list[Token]:
     """Return the tokens of an instruction, its entities found."""
     tokens = read_numbers(lex(clean(text)))
     tokens = _named(tokens, names)
+    tokens = mended(tokens, names.words, lambda word: _mended(word, names) is not None)
     tokens = _numbered(tokens, names)
-    tokens = read_points(tokens)
+    tokens = read_points(read_axes(tokens))
     tokens = _all_robots(tokens)
     tokens = _unknown(tokens, names)
     return [_kind_or_type(tokens, n, names) for n in range(len(tokens))]
@@ -229,10 +232,14 @@ def _name(
     if len(part) == 1 and part[0].kind == "number":
         return None
     joined = "".join(_digits(one) for one in part)
+    letters = spelled(part)
+    last = before[-1].text if before and not before[-1].quoted else ""
+    if letters and (len(letters) > 1 or last in _BEFORE_PLACE | NOUNS["place"] | {"deliver"}):
+        if (found := _spelled(part, letters, names)) is not None:
+            return found
     raw = " ".join(one.raw for one in part)
     wanted = key(joined)
     fits = [(kind, known[wanted]) for kind, known in names.groups() if wanted in known]
-    last = before[-1].text if before and not before[-1].quoted else ""
     told = [one for one in fits if last in NOUNS[one[0]]]
     if told:
         kind, name = told[0] if last != "delivery" or len(told) == 1 else told[-1]
@@ -251,6 +258,15 @@ def _name(
         return None  # a label is said exactly
     quoted = any(one.quoted for one in part)
     return Token(kind, raw.casefold(), name, raw, quoted)
+
+
+def _spelled(part: Sequence[Token], letters: str, names: Names) -> Token | None:
+    """What letters of the radio alphabet name: a place if it is one, a task if there are more."""
+    kind, known = ("place", names.places) if len(letters) == 1 else ("label", names.labels)
+    raw = " ".join(one.raw for one in part)
+    if letters in known:
+        return Token(kind, raw.casefold(), known[letters], raw)
+    return Token("unknown_label", raw.casefold(), None, raw) if len(letters) > 1 else None
 
 
 _BEFORE_PLACE = {"to", "at", "from", "in", "the", "into", "for", "near", "->", "=>", "around", "by"}
@@ -287,6 +303,10 @@ def _numbered(tokens: Sequence[Token], names: Names) -> list[Token]:
     done: list[Token] = []
     for token in tokens:
         last = done[-1] if done else None
+        if token.kind == "number" and last is not None and last.text in _NUMBER:
+            if len(done) > 1 and done[-2].text in NOUNS["robot"]:
+                del done[-1]
+                last = done[-1]
         if token.kind == "number" and last is not None and last.text in NOUNS["robot"]:
             found = by_number.get(_digits(token), [])
             name = found[0] if len(found) == 1 else None
@@ -305,6 +325,9 @@ def _numbered(tokens: Sequence[Token], names: Names) -> list[Token]:
                 token = Token("robot", token.text, found[0], token.raw)
         done.append(token)
     return done
+
+
+_NUMBER = {"number", "no", "nr", "#", "num"}
 
 
 def _all_robots(tokens: Sequence[Token]) -> list[Token]:

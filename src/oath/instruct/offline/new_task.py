@@ -14,7 +14,7 @@ _LOW = re.compile(
     r"\b(low(est|er)?( |-)?priority|priority (is |of |to |at |: |= )*(low\w*|minimum)|(not"
     r"|no longer|less|least|"
     r"isn't) (so |that |very |really |too )?(urgent|important|pressing|critical)|no (rush|hurry|"
-    r"urgency|pressure)|low|can wait|at the end|lowest|whenever (you|there|it)|unimportant|"
+    r"urgency|pressure)|low|(?<!not )(?<!hardly )(?<!never )can wait|at the end|lowest|whenever (you|there|it)|unimportant|"
     r"take your time|last|when (you have|there is) (some |)time|not in a hurry)\b"
 )
 _HIGH = re.compile(

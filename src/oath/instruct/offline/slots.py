@@ -137,7 +137,25 @@ def _obstacle_to_add(heard: Heard, filled: Filled) -> None:
         why = f"Where exactly? '{vague.raw}' says only roughly. {questions.ask_extent()}"
         filled.object_to(why, "obstacle_location")
         return
-    add_points(heard, filled, points)
+    add_points(heard, filled, _corners(heard, points))
+
+
+_BOX = re.compile(
+    r"\b(rectang\w*|square|box|area|zone|region|opposite|diagonal\w*|corner to corner"
+    r"|(bottom|lower|upper|top) (left|right))\b"
+)
+
+
+def _corners(heard: Heard, points: list[Point]) -> list[Point]:
+    """The four corners of what is told by two opposite ones; a line's two ends stay."""
+    boxes = {"box", "crate", "container", "cabinet", "room", "carton"}
+    told = _BOX.search(heard.line) or any(one.value in boxes for one in heard.of("kind"))
+    if len(points) != 2 or not told:
+        return points
+    (left, low), (right, high) = points
+    if left == right or low == high:
+        return points
+    return [(left, low), (right, low), (right, high), (left, high)]
 
 
 def add_points(heard: Heard, filled: Filled, points: Sequence[Point]) -> None:
@@ -209,6 +227,16 @@ def _robot(heard: Heard, filled: Filled) -> None:
         filled.missing.append("robot")
 
 
+_EMERGENCY = re.compile(r"\b(emergency stop|e-stop|estop|stop (all|everything|everybody|everyone))\b")
+
+
+def _paused_robot(heard: Heard, filled: Filled) -> None:
+    if not heard.of("robot", "unknown_robot") and _EMERGENCY.search(heard.line):
+        filled.parameters["robot"] = "all"
+    else:
+        _robot(heard, filled)
+
+
 def _failed_robot(heard: Heard, filled: Filled) -> None:
     _robot(heard, filled)
     if filled.parameters.get("robot") == "all":
@@ -225,7 +253,7 @@ _FILL: Mapping[str, Callable[[Heard, Filled], None]] = {
     "change_task_priority": read_task,
     "cancel_task": read_task,
     "remove_obstacle": _obstacle_to_remove,
-    "pause_robot": _robot,
+    "pause_robot": _paused_robot,
     "resume_robot": _robot,
     "robot_failed": _failed_robot,
     "query_status": _nothing,

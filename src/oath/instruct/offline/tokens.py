@@ -53,6 +53,7 @@ _PLAIN = str.maketrans("’‘‛`´“”„«»–—−→", "'''''\"\"\"\"\"
 _LEX = re.compile(
     r"(?P<quote>\"[^\"]*\"|(?<!\w)'[^']{1,80}'(?!\w))"
     r"|(?P<rank>\d+(?:st|nd|rd|th)\b)"
+    r"|(?P<dots>(?<=\d)\.{2,3}(?=\d))"
     r"|(?P<number>\d+\.\d+|\.\d+|\d+)"
     r"|(?P<word>[^\W\d_]\w*(?:[-_']\w+)*)"
     r"|(?P<mark>->|=>|\S)",
@@ -167,9 +168,10 @@ _POINT = ("point", "dot", "decimal")
 def read_numbers(tokens: Sequence[Token]) -> list[Token]:
     """Replace numbers in words by numbers, e.g. ``two point oh five`` by 2.05."""
     done: list[Token] = []
+    radio = any(one.text in ("niner", "decimal") for one in tokens)
     at = 0
     while at < len(tokens):
-        found = _number(tokens, at)
+        found = _number(tokens, at, radio)
         if found is None:
             done.append(tokens[at])
             at += 1
@@ -180,7 +182,7 @@ def read_numbers(tokens: Sequence[Token]) -> list[Token]:
     return [_not_one(done, n) for n in range(len(done))]
 
 
-def _number(tokens: Sequence[Token], at: int) -> tuple[Token, int] | None:
+def _number(tokens: Sequence[Token], at: int, radio: bool) -> tuple[Token, int] | None:
     start, sign = at, 1.0
     if tokens[at].text in ("minus", "negative") and at + 1 < len(tokens):
         sign, at = -1.0, at + 1
@@ -191,6 +193,8 @@ def _number(tokens: Sequence[Token], at: int) -> tuple[Token, int] | None:
         value, at = float(first.value), at + 1
     elif first.kind == "word" and first.text in _CARDINALS:
         whole, at = _cardinal(tokens, at)
+        while radio and whole < 100 and _is_one(tokens, at, 0, 9):  # digit by digit
+            whole, at = 10 * whole + _CARDINALS[tokens[at].text], at + 1
         value = float(whole)
     else:
         return None
@@ -277,10 +281,12 @@ def _not_one(tokens: Sequence[Token], at: int) -> Token:
 
 # -- points
 
-_BETWEEN = {",", ";", "/", "and", "&", "comma"}
+_BETWEEN = {",", ";", "/", "|", "and", "&", "comma"}
+_LOOSE = {"by", "-", "x"}
+_BEFORE_LOOSE = {"at", "position", "location", "coordinates", "coordinate", "grid", "point", "spot"}
 _METERS = {"m", "meter", "meters"}
 _EQUALS = {"=", ":", "is", "equals", "of", "at", "coordinate", "equal", "to"}
-_CLOSE = {"(": ")", "[": "]"}
+_CLOSE = {"(": ")", "[": "]", "{": "}", "<": ">"}
 _OF_MANY = {"robots", "tasks", "bots", "units", "jobs", "labels"}
 
 
@@ -314,7 +320,7 @@ def _points(tokens: Sequence[Token], at: int, before: Token | None) -> tuple[lis
             rest = {one.text for one in body if one.kind != "number"}
             if values and rest <= _BETWEEN | _METERS | _EQUALS | {"x", "y"}:
                 if len(values) == 2 and None not in values:
-                    return [_point(values)], inside + 1
+                    return [point_token(values)], inside + 1
                 return [], inside + 1
         return [], at + 1
     if text in ("x", "y"):
@@ -324,7 +330,8 @@ def _points(tokens: Sequence[Token], at: int, before: Token | None) -> tuple[lis
     return [], at + 1
 
 
-def _point(values: Sequence[float]) -> Token:
+def point_token(values: Sequence[float]) -> Token:
+    """A point as a token."""
     raw = f"({values[0]:.10g}, {values[1]:.10g})"
     return Token("point", raw, (values[0], values[1]), raw)
 
@@ -347,11 +354,13 @@ def _by_axes(tokens: Sequence[Token], at: int) -> tuple[list[Token], int]:
         end = here
         while here < len(tokens) and tokens[here].text in _BETWEEN | _METERS:
             here += 1
-    return [_point((found["x"], found["y"]))], end
+    return [point_token((found["x"], found["y"]))], end
 
 
 def _run(tokens: Sequence[Token], at: int, before: Token | None) -> tuple[list[Token], int]:
     """Read numbers in a row as pairs, if their number and what separates them allow it."""
+    if before is not None and before.text in _BEFORE_LOOSE and (found := _loose(tokens, at)):
+        return found, at + 3
     numbers, gaps, end = [tokens[at]], list[str](), at + 1
     here = end
     while here < len(tokens):
@@ -369,8 +378,10 @@ def _run(tokens: Sequence[Token], at: int, before: Token | None) -> tuple[list[T
         here += 1
         end = here
     within = set(gaps[::2])
+    spoken = len(numbers) > 2 and all(one.raw.isalpha() for one in numbers) and within == {""}
     usable = (
-        len(numbers) % 2 == 0
+        not (spoken and set(gaps) != {""})  # as "one two, one nine": digits or numbers?
+        and len(numbers) % 2 == 0
         and len(within) == 1
         and all(one.value is not None for one in numbers)
         and not (before is not None and before.text in _OF_MANY)
@@ -378,4 +389,15 @@ def _run(tokens: Sequence[Token], at: int, before: Token | None) -> tuple[list[T
     if not usable:
         return [], end
     pairs = zip(numbers[::2], numbers[1::2], strict=True)
-    return [_point((a.value, b.value)) for a, b in pairs], end
+    return [point_token((a.value, b.value)) for a, b in pairs], end
+
+
+def _loose(tokens: Sequence[Token], at: int) -> list[Token]:
+    """Read ``4 by 7.5`` or ``4-7``, which is a point only where one is announced."""
+    if at + 2 >= len(tokens) or tokens[at + 1].text not in _LOOSE:
+        return []
+    pair = (tokens[at], tokens[at + 2])
+    behind = tokens[at + 3].text if at + 3 < len(tokens) else ""
+    if any(one.kind != "number" or one.value is None for one in pair) or behind in _LOOSE | {"m"}:
+        return []
+    return [point_token([one.value for one in pair])]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 from pydantic import ValidationError
@@ -79,6 +80,7 @@ def understand(heard: Heard) -> Reply:
         return Reply(status="clarification", message=why)
     if not any(one.kind not in ("mark", "number") for one in heard.tokens):
         return nothing(heard)
+    heard = replace(heard, tokens=gates.without_rest(heard.tokens))
     parts = commands_of(heard)
     if len(parts) == 1:
         return _one(parts[0])
@@ -222,7 +224,15 @@ def _commands(intent: str, filled: Filled) -> tuple[Command, ...]:
 
 def leftover(heard: Heard, intent: str) -> str | None:
     """What of an instruction no parameter has taken up, as a question."""
-    numbers = heard.of("number")
+    points = sum(one.kind == "point" for one in heard.tokens)
+    counted = {
+        n
+        for n, (one, behind) in enumerate(pairwise(heard.tokens))
+        if one.value == points and behind.text in ("corners", "points", "vertices", "corner")
+    }
+    numbers = [
+        one for n, one in enumerate(heard.tokens) if one.kind == "number" and n not in counted
+    ]
     if numbers and intent not in ("query_status", "undo"):
         return (
             f"What is '{numbers[0].raw}'? I take points as pairs in metres, e.g. (5, 19.5); say it "

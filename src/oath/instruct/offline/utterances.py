@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import re
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 
@@ -137,7 +137,7 @@ _WORLDS = (
 )
 
 
-def _world(names: Sequence[tuple[str, ...]], words: Container[str]) -> Names:
+def _world(names: Sequence[tuple[str, ...]], words: frozenset[str]) -> Names:
     places, robots, labels, obstacles, types = ({key(one): one for one in some} for some in names)
     kinds = {kind: kind for kind in sorted(KINDS)}
     return Names(places, robots, labels, obstacles, kinds, types, words)
