@@ -114,6 +114,8 @@ _IF_POLITE = re.compile(
     r"|\bif (it|that|this) (is|would be|be) (ok|okay|all right|alright|fine|possible|convenient"
     r"|no (trouble|bother|problem)|not too (much|late)[a-z ]*|good|acceptable|allowed)\b"
     r"|\bif (i may|you please|you would|you will|you do not mind|that suits you)\b"
+    r"|\b(appreciate|grateful|great|nice|good|glad|happy|lovely|helpful|thankful|wonderful|better"
+    r"|obliged|kind|best)( it)? if\b"
     r"|\b(when|while|as) (i|we) (was|were) \w+ing\b"
     r"|\b(in case you (missed|have not)|as soon as possible|when (you )?(have|get|find) (a|the"
     r"|some)"
@@ -178,6 +180,8 @@ _OR = re.compile(
     r"|(?<!going )(?<!go )anywhere)\b"
 )
 
+_OR_DO = re.compile(rf"\b{_VERB}( it| <\w+>)? or( to| else)? {_VERB}\b")
+
 _COMPARES = re.compile(
     r"<label> (\w+ ){0,4}(before|after|than|over|ahead of|instead of|rather than|as|like"
     r"|but not|behind"
@@ -219,7 +223,7 @@ _REST_WAITS = re.compile(
     r"((and|but|while|,|;|\.) )*(everything|all|anything|every\w+|the|all the|the other|our)"
     r"( (else|others?|rest|tasks?|jobs?|orders?))* (can|may|must|has to|have to|should|will|could)"
     r" (wait|come (later|after\w*|second)|be done (later|after\w*)|follow|be left)( till later)?"
-    r"|^\W*drop everything( else)? (and|,|;|for)( (do|handle|take|get|deal with))?"
+    r"|^\W*drop (everything|<robot>)( else)? (and|,|;|for)( (do|handle|take|get|deal with))?"
 )
 
 
@@ -333,7 +337,7 @@ def doubtful(line: str, intent: str) -> str | None:
         return "I understand metres only. Give the points in metres, e.g. (5, 19.5)."
     if _DOUBTS.search(line):
         return "You sound unsure, so I ask before I propose anything."
-    if intent != "query_status" and _OR.search(line):
+    if intent != "query_status" and (_OR.search(line) or _OR_DO.search(line)):
         return "That leaves open which one is meant. Name exactly one."
     line = _NO_OTHER.sub(" ", line)
     if intent in ("change_task_priority", "cancel_task") and _COMPARES.search(line):
@@ -417,3 +421,9 @@ def is_vague(tokens: Sequence[Token], at: int) -> bool:
     return bool(
         _VAGUE.search(before.strip()) or _VAGUE_AFTER.search(as_line(tokens[at + 1 : at + 5]))
     )
+
+
+def guarding() -> frozenset[str]:
+    """Words that these gates look for, so that no slip is seen in them."""
+    patterns = [one.pattern for one in globals().values() if isinstance(one, re.Pattern)]
+    return frozenset(re.findall(r"[a-z]{3,}", re.sub(r"\\[a-z]", " ", " ".join(patterns))))

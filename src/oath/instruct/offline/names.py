@@ -32,6 +32,10 @@ KINDS = {
     "wall", "barrier", "bush", "box", "gate", "fence", "rock", "spill", "hole", "tree", "crate",
     "pallet", "cart", "car", "forklift", "door", "plant", "table", "chair", "ladder", "truck",
     "puddle", "shelf", "rack", "cone", "debris", "rubble", "hedge", "stone", "boulder", "trolley",
+    "stretcher", "cable", "skip", "bucket", "hose", "sofa", "wheelchair", "bike", "bicycle", "lorry",
+    "van", "tarpaulin", "beam", "pipe", "branch", "barrel", "drum", "bench", "fridge", "cabinet",
+    "dumpster", "trailer", "rope", "net", "curtain", "leak", "ditch", "trench", "railing", "bollard",
+    "column", "divider", "booth", "statue", "scooter", "desk", "wardrobe", "ramp", "cordon",
     "container", "cage", "pole", "pillar", "partition", "barricade", "scaffold", "scaffolding",
 }  # fmt: skip
 """What obstacles are called anywhere, besides the kinds of the live world."""

@@ -15,7 +15,7 @@ _LOW = re.compile(
     r"|no longer|less|least|"
     r"isn't) (so |that |very |really |too )?(urgent|important|pressing|critical)|no (rush|hurry|"
     r"urgency|pressure)|low|(?<!not )(?<!hardly )(?<!never )can wait|at the end|lowest|whenever (you|there|it)|unimportant|"
-    r"take your time|last|when (you have|there is) (some |)time|not in a hurry)\b"
+    r"take your time|depriorit\w+|downgrad\w+|demot\w+|last|when (you have|there is) (some |)time|not in a hurry)\b"
 )
 _HIGH = re.compile(
     r"\b((?<!not )(?<!no longer )(?<!not so )(?<!not very )(?<!not that )(urgent(ly)?|asap"

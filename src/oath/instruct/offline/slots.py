@@ -114,6 +114,13 @@ def _read_changed_priority(heard: Heard, filled: Filled, meant: str | None) -> N
 # -- obstacles
 
 
+_THING = re.compile(
+    r"\b(?:a|an|some) (?:big |large |huge |broken |small |long )?([a-z]{3,20}) (?:is|has|was|blocks?"
+    r"|blocking|lying|lies|stands?|standing|sits?|sitting|from|across|between|along|in|on|at|fell)\b"
+)
+"""An obstacle told by a noun that nobody foresaw."""
+
+
 def _obstacle_to_add(heard: Heard, filled: Filled) -> None:
     points: list[Point] = []
     vague = None
@@ -128,6 +135,9 @@ def _obstacle_to_add(heard: Heard, filled: Filled) -> None:
         filled.parameters["obstacle_type"] = kinds[0]
     elif kinds:
         filled.object_to(f"Which kind: {' or '.join(kinds)}?", "obstacle_type")
+    elif noun := _THING.search(heard.line):
+        if noun[1] not in heard.models.words:
+            filled.parameters["obstacle_type"] = noun[1]
     if unknown := heard.of("unknown_place"):
         filled.object_to(
             questions.unknown_place(heard, unknown[0]) + " " + questions.ask_extent(),

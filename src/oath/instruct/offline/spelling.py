@@ -5,8 +5,9 @@ from __future__ import annotations
 import string
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
 
+from oath.instruct.offline import clear, gates
 from oath.instruct.offline.tokens import Token
 
 ALPHABET = {
@@ -68,10 +69,16 @@ def mended(
 def _mended(token: Token, words: frozenset[str]) -> Token:
     if token.kind != "word" or token.quoted or token.text in words or token.text in ALPHABET:
         return token
-    if token.raw.isupper() and len(token.raw) < 4:
+    if token.text in _guarding() or token.raw.isupper() and len(token.raw) < 4:
         return token
     word = nearest(token.text, words)
     return token if word is None else replace(token, text=word)
+
+
+@cache
+def _guarding() -> frozenset[str]:
+    """Words that are right as they are, for a gate looks for them."""
+    return gates.guarding() | clear.guarding()
 
 
 @lru_cache(maxsize=4096)
