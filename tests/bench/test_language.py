@@ -84,16 +84,27 @@ def rows(name: str, answer: Callable[[Utterance], Reply] = knows) -> list[Row]:
 # -- the data
 
 
-def test_there_are_many_utterances_of_every_kind_and_intent() -> None:
-    said = ALL["held-out"]
+@pytest.mark.parametrize("name", ["first", "held-out"])
+def test_there_are_many_utterances_of_every_kind_and_intent(name: str) -> None:
+    said = ALL[name]
     assert len(said) >= 450 and len({one.family for one in said}) >= 45
     assert len({one.turns for one in said}) == len(said)
     assert sum(one.intent in PAPERS for one in said) >= 200
     full = Counter(one.intent for one in said if one.kind == "full")
     assert set(full) == set(COMMANDS) and min(full.values()) >= 10
     assert {one.kind for one in said} == set(KINDS)
-    assert len(ALL["dialogues"]) >= 30
-    assert all(2 <= len(one.turns) <= 4 for one in ALL["dialogues"])
+
+
+def test_there_are_dialogues() -> None:
+    said = [*ALL["first dialogues"], *ALL["dialogues"]]
+    assert len(said) >= 60 and len({one.turns for one in said}) == len(said)
+    assert all(2 <= len(one.turns) <= 4 for one in said)
+
+
+def test_the_second_set_repeats_nothing_of_the_first() -> None:
+    first, second = ALL["first"], ALL["held-out"]
+    assert not {one.turns for one in first} & {one.turns for one in second}
+    assert not {one.family for one in first} & {one.family for one in second}
 
 
 def test_the_instructions_are_those_of_the_paper() -> None:
@@ -275,7 +286,7 @@ def test_table_figure_and_finding() -> None:
     assert main["right [%]"] == main["intent right [%]"] == main["slots exact [%]"] == 100
     assert main["wrong proposals [%]"] == main["needless questions [%]"] == 0
     assert main["ambiguous asked about [%]"] == 100
-    assert "held-out: family radio-terse" in read
+    assert f"{TITLES['held-out']}: family forklift-driver" in read
     assert markdown(list(read.values()))
     chosen.plot(measured).canvas.draw()
     text = chosen.finding(measured)

@@ -1,11 +1,12 @@
 """What operators may say, what it means, and how an interpreter's answers are judged.
 
-Three sets lie beside this file. ``instructions-90.csv`` holds the ninety instructions of Li, Ren,
+Several sets lie beside this file. ``instructions-90.csv`` holds the ninety instructions of Li, Ren,
 Miller, Coogan, Feigh, Zhao, "Adaptive Obstacle-Aware Task Assignment and Planning for Heterogeneous
 Robot Teaming", 2025, with the paper's intent, and our own judgement of what the right answer on
-the paper's maze is. ``heldout.csv`` and ``dialogues.jsonl`` are ours: utterances in families, each
-family the wording of one imagined kind of person, and short dialogues with what they come to.
-Whoever wrote them knew no interpreter's rules or training data, and fixed the meanings first.
+the paper's maze is. ``heldout*.csv`` and ``dialogues*.jsonl`` are ours: utterances in families,
+each family the wording of one imagined kind of person, and short dialogues with what they come to.
+Whoever wrote them knew no interpreter's rules or training data, and fixed the meanings first. The
+first set may be shown to those who improve an interpreter, the second never.
 
 Kinds: ``full`` says all that is needed, and a careful colleague would act on it; of ``partial`` the
 intent is clear but a slot is missing; ``ambiguous`` has to be asked about, if not refused; ``none``
