@@ -1,11 +1,11 @@
 """How much of a core a mission server needs, and how late its clients hear of what happens.
 
-Run with ``python bench/serve.py [--quick]``. The server is a process of its own. First its start on a
-long journal is timed, then commands on the paper's maze, then 200 robots of a generated mission drive and 20 clients listen
-through sockets. A frame's lag is the wall time between its mission clock and when a client has it,
-counted from the fastest frame of the last seconds: what the fastest needs (about 1 ms) is left out,
-but what the mission clock waits for planning counts. What the server itself measures, from when
-something is known until a client has been sent it, stands beside it.
+Run with ``python bench/serve.py [--quick]``. The server is a process of its own. First its start on
+a long journal is timed, then commands on the paper's maze, then 200 robots of a generated mission
+drive and 20 clients listen through sockets. A frame's lag is the wall time between its mission
+clock and when a client has it, counted from the fastest frame of the last seconds: what it needs
+(about 1 ms) is left out, but what the mission clock waits for planning counts. What the server
+itself measures, from when something is known until a client has been sent it, stands beside it.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from typing import Any
 import httpx
 import numpy as np
 import yaml
-from journal import MISSION, long_log
 from websockets.asyncio.client import ClientConnection, connect
 
+from journal import MISSION, long_log
 from oath.store import Origin
 from oath.store.sqlite import SqliteJournal
 
@@ -195,7 +195,7 @@ def client(url: str) -> httpx.AsyncClient:
 
 def start_time(events: int, starts: int) -> None:
     """Time starts on a long journal, from nothing to an answer."""
-    origin, log = Origin.of(MISSION, allocator="lns", seed=1), long_log(events)
+    origin, log = Origin.of(MISSION, allocator="lns", seconds=0.05), long_log(events)
     walls, shares = [], []
     for _ in range(starts):
         with TemporaryDirectory() as folder:
@@ -203,7 +203,7 @@ def start_time(events: int, starts: int) -> None:
             with closing(SqliteJournal.create(path, origin)) as journal:
                 journal.append(log)
             begin = time.monotonic()
-            with serving(Path(MISSION), "--seed", "1", journal=path) as (process, url):
+            with serving(Path(MISSION), journal=path) as (process, url):
                 headers = {"Authorization": f"Bearer {TOKEN}"}
                 httpx.get(f"{url}/api/health", headers=headers, trust_env=False).raise_for_status()
                 walls.append(time.monotonic() - begin)

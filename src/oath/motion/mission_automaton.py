@@ -8,7 +8,7 @@ rules ask for goes through the general translation once per mission.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +32,18 @@ class Rules:
     avoid: frozenset[str]
     automaton: Automaton
     relevant: frozenset[str]
+    _steps: dict[tuple[frozenset[int], Letter], frozenset[int]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     def step(self, states: frozenset[int], letter: Letter) -> frozenset[int]:
         """Where the automaton may be after one more letter; empty once a rule is broken."""
+        after = self._steps.get((states, letter))
+        if after is None:
+            after = self._steps[states, letter] = self._step(states, letter)
+        return after
+
+    def _step(self, states: frozenset[int], letter: Letter) -> frozenset[int]:
         if letter & self.avoid:
             return frozenset()
         return frozenset(q for state in states for q in self.automaton.successors(state, letter))

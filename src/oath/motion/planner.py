@@ -190,6 +190,8 @@ class Planner:
         if at == self.position:
             return self._states
         zones = self.roadmap.zones
+        if not zones.atoms:
+            return self.rules.step(self._states, zones.classes[0])
         label = zones.labels(np.array([self.position]), np.array([at]))[0]
         return self.rules.step(self._states, zones.classes[label])
 

@@ -43,6 +43,7 @@ _TABLES = (
 _ROWS = (
     "SELECT seq, t, type, version, data, hash FROM events WHERE seq BETWEEN ? AND ? ORDER BY seq"
 )
+_DATA = "SELECT seq, version, data FROM events WHERE seq BETWEEN ? AND ? ORDER BY seq"
 _END = 2**63 - 1
 _SETTINGS = tuple(field.name for field in fields(Origin) if field.name != "files")
 
@@ -156,7 +157,7 @@ class SqliteJournal:
     def replay(self, since: int = 0) -> list[AnyEvent]:
         """Return the events from a sequence number on."""
         with self._lock, self._asking():
-            rows = self._db.execute(_ROWS, (since, _END))
+            rows = self._db.execute(_DATA, (since, _END))
             return list(_events(rows, self.path, self._upcasters))
 
     def known(self, id: str) -> Answer | None:
@@ -212,7 +213,7 @@ def read(path: str | Path, *, last: int | None = None, upcasters: Upcasters = UP
     with _reading(path, "mode=ro") as db:
         origin, hash = _origin(db, path)
         _check(db, path, hash, upcasters, last)
-        rows = db.execute(_ROWS, (0, _END if last is None else last))
+        rows = db.execute(_DATA, (0, _END if last is None else last))
         return Stored(origin, list(_events(rows, path, upcasters)))
 
 
@@ -421,10 +422,10 @@ def _damaged(path: Path, whole: int, problem: str) -> BadInput:
 
 
 def _events(
-    rows: Iterable[tuple[Any, ...]], path: Path, upcasters: Upcasters
+    rows: Iterable[tuple[int, int, str]], path: Path, upcasters: Upcasters
 ) -> Iterator[AnyEvent]:
     now = current(upcasters)
-    for seq, _, _, version, data, _ in rows:
+    for seq, version, data in rows:
         try:
             line = _line(data)
             yield rebuilt(line if version == now else upcast(line, version, upcasters))
