@@ -258,10 +258,10 @@ def _still_good(state: State, routes: Mapping[str, Route]) -> dict[str, Route]:
     passed over, and with it every route that takes a task which such a robot keeps; another round
     is due then.
     """
-    good = {}
+    good, may_begin = {}, frozenset(state.open_tasks())
     for id, route in routes.items():
         left = tuple(stop for stop in route if not _is_past(state, id, stop))
-        if _fits(state, id, left):
+        if _fits(state, id, left, may_begin):
             good[id] = left
     while True:
         kept = {
@@ -285,7 +285,7 @@ def _is_past(state: State, robot: str, stop: RouteStop) -> bool:
     return stop.task in state.completed or (carried and is_first)
 
 
-def _fits(state: State, robot: str, route: Route) -> bool:
+def _fits(state: State, robot: str, route: Route, may_begin: frozenset[str]) -> bool:
     """Whether a route delivers all that its robot can, and takes up only what it may and can."""
     load = len(state.robots[robot].carrying)
     for stop in route:
@@ -294,8 +294,9 @@ def _fits(state: State, robot: str, route: Route) -> bool:
             return False
     carrying = set(state.deliverable(robot))
     tasks = {stop.task for stop in route}
-    may_begin = set(state.open_tasks()) if robot not in state.failed else set()
-    if robot in state.paused:
+    if robot in state.failed:
+        may_begin = frozenset()
+    elif robot in state.paused:
         may_begin &= {stop.task for stop in state.robots[robot].route}
     return carrying <= tasks and all(
         task in may_begin and (robot, task) not in state.refused for task in tasks - carrying
