@@ -34,8 +34,10 @@ OFFLINE = "oath.instruct.offline:Offline"
 
 SETS: dict[str, Callable[[], list[Utterance]]] = {
     "paper": instructions,
-    "held-out": lambda: heldout("heldout-2"),
-    "dialogues": lambda: dialogues("dialogues-2"),
+    "held-out": lambda: heldout("heldout-3"),
+    "dialogues": lambda: dialogues("dialogues-3"),
+    "second": lambda: heldout("heldout-2"),
+    "second dialogues": lambda: dialogues("dialogues-2"),
     "first": heldout,
     "first dialogues": dialogues,
 }
@@ -43,13 +45,16 @@ TITLES = {
     "paper": "the paper's 90",
     "held-out": "held-out",
     "dialogues": "held-out dialogues",
+    "second": "second set",
+    "second dialogues": "second dialogues",
     "first": "first set",
     "first dialogues": "first dialogues",
 }
 MAIN = "held-out"
 """The set whose figures are published.
 
-Whoever improves an interpreter may look at the first set; nobody may look at this one.
+The first and the second set were seen while the interpreter was written; this one was not, and
+nobody who improves an interpreter may look at it.
 """
 
 PAPER_RIGHT = 83
@@ -281,7 +286,7 @@ def finding(rows: Sequence[Row]) -> str:
     said = [row for row in rows if row["set"] in SETS]
     paper = [row for row in said if row["set"] == "paper"]
     acts = [row for row in paper if row["kind"] == "full"]
-    main, seen = shares[TITLES[MAIN]], shares[TITLES["first"]]
+    main = shares[TITLES[MAIN]]
     three = shares[f"{TITLES[MAIN]}: the paper's three intents"]
     times = [row["ms"] for row in said]
     first = [row for row in rows if row["set"] == "first call"]
@@ -296,9 +301,8 @@ def finding(rows: Sequence[Row]) -> str:
         f"{_shown(main['slots exact [%]'])} of what is said in full, "
         f"{_shown(main['needless questions [%]'])} of it is asked about needlessly, and "
         f"{_shown(main['ambiguous asked about [%]'])} of what is ambiguous is asked about. Of the "
-        f"dialogues {_shown(shares[TITLES['dialogues']]['right [%]'])} end as they should. (The "
-        f"first set, kept apart from this one: intents {_shown(seen['intent right [%]'])}, slots "
-        f"{_shown(seen['slots exact [%]'])}, wrong {_shown(seen['wrong proposals [%]'])}.) "
+        f"dialogues {_shown(shares[TITLES['dialogues']]['right [%]'])} end as they should. (Seen "
+        f"while the interpreter was written: {_seen(shares, 'second')}; {_seen(shares, 'first')}.) "
         f"Wrong proposals: {sum(row['wrong'] for row in paper)} to the paper's instructions, "
         f"{sum(row['wrong'] for row in held)} to the {len(held)} held-out utterances and dialogues "
         f"({_shown(_percent(held, lambda row: row['wrong']))}; "
@@ -308,6 +312,14 @@ def finding(rows: Sequence[Row]) -> str:
         f"interpretation takes {np.median(times):.2f} ms (p50) and {np.percentile(times, 95):.2f} "
         f"ms (p95), the first of a process {max(row['ms'] for row in first):.1f} ms, after "
         f"{max(row['loading ms'] for row in first):.0f} ms to load the interpreter."
+    )
+
+
+def _seen(shares: dict[str, Row], name: str) -> str:
+    row = shares[TITLES[name]]
+    return (
+        f"{TITLES[name]}: intents {_shown(row['intent right [%]'])}, slots "
+        f"{_shown(row['slots exact [%]'])}, wrong {_shown(row['wrong proposals [%]'])}"
     )
 
 
@@ -321,7 +333,8 @@ STUDY = Study(
     asked="Does the interpreter take an operator's words for what was meant, ask about what is "
     "missing or ambiguous, and never propose what was not said? The paper's ninety instructions, "
     "and utterances and dialogues in families of wording that nobody who wrote rules or training "
-    "data had seen. *Right* is: what is said in full is proposed exactly; exactly what is missing "
+    "data had seen; the first and the second set were seen while the interpreter was written. "
+    "*Right* is: what is said in full is proposed exactly; exactly what is missing "
     "is asked for; what is ambiguous is not acted on; what is no command leads to nothing. For the "
     "paper's instructions *right* is: the intent is, and nothing but what was said is proposed; "
     "what one cannot act on in this maze leads to a question about the right intent, and to one "

@@ -6,7 +6,8 @@ Robot Teaming", 2025, with the paper's intent, and our own judgement of what the
 the paper's maze is. ``heldout*.csv`` and ``dialogues*.jsonl`` are ours: utterances in families,
 each family the wording of one imagined kind of person, and short dialogues with what they come to.
 Whoever wrote them knew no interpreter's rules or training data, and fixed the meanings first. The
-first set may be shown to those who improve an interpreter, the second never.
+first and the second set were seen while the interpreter was written; the third may never be shown
+to those who improve one.
 
 Kinds: ``full`` says all that is needed, and a careful colleague would act on it; of ``partial`` the
 intent is clear but a slot is missing; ``ambiguous`` has to be asked about, if not refused; ``none``
