@@ -284,6 +284,7 @@ def test_speed(server: Server) -> None:
     server.post("/api/clock", {"speed": 1.0})
 
 
+@pytest.mark.slow
 def test_a_server_ends_in_good_order() -> None:
     for sign in (signal.SIGINT, signal.SIGTERM):
         with serving() as server:
@@ -304,6 +305,7 @@ def test_a_mission_can_be_finished() -> None:
         assert server.get("/api/missions")["missions"][0]["running"] is False
 
 
+@pytest.mark.slow
 def test_a_server_can_stop_when_all_is_done() -> None:
     with serving(MAZE, "--speed", "100", "--until-done", "--allocator", "greedy") as server:
         assert server.process.wait(60) == 0
@@ -314,6 +316,7 @@ def run(*options: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
 
 
+@pytest.mark.slow
 def test_a_port_that_is_taken() -> None:
     with serving() as server:
         done = run(MAZE, "--port", str(server.port), "--token", OPERATOR)
@@ -328,6 +331,7 @@ def test_others_need_a_token() -> None:
     assert "--token" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_mission_goes_on_where_it_was(tmp_path: Path) -> None:
     journal = ("--journal", str(tmp_path / "maze.journal"))
     with serving(MAZE, *journal, "--speed", "20", "--allocator", "greedy") as server:
@@ -351,6 +355,7 @@ def test_a_mission_goes_on_where_it_was(tmp_path: Path) -> None:
         assert "goes on with the mission and settings it began with" in server.process.stderr.read()
 
 
+@pytest.mark.slow
 def test_a_journal_of_another_mission(tmp_path: Path) -> None:
     journal = ("--journal", str(tmp_path / "maze.journal"))
     with serving(MAZE, *journal) as server:

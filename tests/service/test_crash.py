@@ -109,6 +109,7 @@ def check(events: list[AnyEvent], tower: Tower) -> None:
     assert verify(mission, events).violations == ()
 
 
+@pytest.mark.slow
 def test_a_few_kills(tmp_path: Path) -> None:
     kill_at_random(3, tmp_path / "maze.journal", seed=1)
 

@@ -24,6 +24,7 @@ def add(server: Server, n: int) -> httpx.Response:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only there can a process be limited later")
+@pytest.mark.slow
 def test_a_full_disk(tmp_path: Path) -> None:
     journal = tmp_path / "maze.journal"
     options = ("--journal", str(journal), "--allocator", "greedy", "--points", "300")

@@ -174,6 +174,7 @@ def test_a_client_from_the_future_hears_what_is_new(server: Server) -> None:
         assert until(socket, "state")["state"]["seq"] >= 0
 
 
+@pytest.mark.slow
 def test_there_is_a_limit_to_clients() -> None:
     with serving() as server, ExitStack() as stack:
         for _ in range(64):

@@ -25,6 +25,7 @@ def recorded(path: Path) -> dict[str, list[int]]:
     return times
 
 
+@pytest.mark.slow
 def test_a_served_mission_is_recorded_even_if_it_goes_on_later(tmp_path: Path) -> None:
     journal = tmp_path / "maze.journal"
     options = (*OPTIONS, "--journal", str(journal), "--record")
@@ -42,6 +43,7 @@ def test_a_served_mission_is_recorded_even_if_it_goes_on_later(tmp_path: Path) -
         assert times == sorted(times)
 
 
+@pytest.mark.slow
 def test_a_recording_that_exists_is_kept_and_no_journal_begun(tmp_path: Path) -> None:
     record, journal = tmp_path / "a.mcap", tmp_path / "maze.journal"
     record.write_text("mine")
