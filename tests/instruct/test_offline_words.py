@@ -76,6 +76,21 @@ def test_numbers(text: str, values: list[float | None]) -> None:
         ("5, 6, 7", []),
         ("2 by 3", []),
         ("5-7", []),
+        ("grid 5-7", [(5, 7)]),
+        ("at 2 by 3.5", [(2, 3.5)]),
+        ("at 4 comma 7 point 5", [(4, 7.5)]),
+        ("(7|9)", [(7, 9)]),
+        ("{4; 7}", [(4, 7)]),
+        ("<4, 7>", [(4, 7)]),
+        ("4/7.5", [(4, 7.5)]),
+        ("one two, one niner decimal five", [(12, 19.5)]),
+        ("one two, one nine point five", []),
+        ("along x = 5 from y 2 to y 6", [(5, 2), (5, 6)]),
+        ("y is 4, x between 2 and 6", [(2, 4), (6, 4)]),
+        ("x=7.5..8.5 y=11", [(7.5, 11), (8.5, 11)]),
+        ("from 2 to 6 on the y axis at x 5", [(5, 2), (5, 6)]),
+        ("x from 2 to 3 and y from 7 to 9", [(2, 7), (3, 7), (3, 9), (2, 9)]),
+        ("x 5 from y 2 to y 6, then 7", []),
     ],
 )
 def test_points(text: str, found: list[tuple[float, float]]) -> None:
@@ -117,10 +132,31 @@ def test_a_point_in_digits_is_read_as_it_is(x: int, y: int) -> None:
         ("room F", "unknown_place", [None]),
         ("robot9", "unknown_robot", [None]),
         ("task zz", "unknown_label", [None]),
+        ("robot number two", "robot", ["robot2"]),
+        ("task bravo bravo", "label", ["bb"]),
+        ("deliver to bravo", "place", ["b"]),
+        ("bravo says hello", "place", []),
+        ("task zulu zulu", "unknown_label", [None]),
+        ("a wal and a stretcher", "kind", ["wall", "stretcher"]),
     ],
 )
 def test_names(text: str, kind: str, values: list[str | None]) -> None:
     assert kinds(text, kind) == values
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("cancle taks", "cancel task"),
+        ("incraese the priorty", "increase the priority"),
+        ("feet", "feet"),
+        ("nearly", "nearly"),
+        ("ball", "ball"),
+    ],
+)
+def test_slips_in_everyday_words_are_mended(text: str, words: str) -> None:
+    known = Names.of(LIVE, models().words) if False else WORLD
+    assert " ".join(one.text for one in tag(text, known)) == words
 
 
 def test_digits_have_no_slips() -> None:

@@ -8,6 +8,7 @@ from oath.instruct.offline.tokens import Token, point_token
 
 _JOINS = {"=", ":", "is", "equals", "equal", "of", "at", "coordinate", "axis", "value", "values"}
 _OPENS = {"from", "between", "spans", "runs", "running", "goes", "ranges", "ranging", "over"}
+_LINKS = {"and", ",", "at", "with"}
 _RANGES = {"to", "..", "...", "-", "until", "till", "through", "til", "->", "=>"}
 _STEPS = {"up", "all", "the", "way", "down", "reaching", "on", "coordinates"}
 
@@ -37,7 +38,10 @@ def read_axes(tokens: Sequence[Token]) -> list[Token]:
             continue
         axis, values, end = read
         found[axis] = values
-        spans.append((at, end))
+        begin = at
+        while spans and begin > spans[-1][1] and tokens[begin - 1].text in _OPENS | _LINKS:
+            begin -= 1
+        spans.append((begin, end))
         at = end
     if sum(map(len, found.values())) != numbers or set(found) != {"x", "y"}:
         return list(tokens)

@@ -20,18 +20,22 @@ _SAYS: Mapping[str, str] = {
         r"|obsolete|pointless|skip\w*|nix|axe[d]?|exclud\w*|leave (\w+ |<\w+> ){0,2}(out|undone"
         r"|alone)|cut|rm|dump\w*|pull\w*|purg\w*|off the (\w+ )?(list|table|plan|books|board|menu"
         r"|schedule)|moot|out of the (plan|list|queue|schedule)|shelv\w*|stand down|chuck|toss"
-        r"|eliminat\w*|disregard|ignor\w*|rescind\w*|short-ship|belay|wave off|(is|are) off|without|after all|lose|gone|dead|wipe\w*"
+        r"|eliminat\w*|disregard|ignor\w*|rescind\w*|decided against|short-ship|belay|wave off"
+        r"|(is|are) off|without|after all|lose|gone|dead|wipe\w*"
     ),
     "robot_failed": (
         r"fail\w*|brok\w*|break\w* down|breakdown|dead|di(ed|es)|defect\w*|kaput\w*|crash\w*"
-        r"|out of (order|service|action|commission|operation|use|the game|play|the mission)|lost"
+        r"|out of (order|service|action|commission|operation|use|the game|play|the mission)"
+        r"|lost(?= (all|power|contact|connection|signal|its (wheel|drive|motor|power)|for good"
+        r"|<robot>)| ?[^\w ]|$)"
         r"|toast|malfunction\w*|wreck\w*|tipped|overturned|toppled|f(e|a)ll(en)? over"
         r"|(write|wrote|written|writing|count|rule|take|taken|knocked|strike|struck|leave) .*"
         r"(off|out)|(not|no longer|stopped|never|without|cannot) (\w+ ){0,3}(work\w*|function\w*"
         r"|operat\w*|mov\w*|run\w*|driv\w*|boot\w*|start\w*|go\w*|us\w+|count\w*|get up|rely"
         r"|available|continue|usable|power)|burn\w*|brick\w*|conked|g(i|a)ven? up|smok\w*|fire"
         r"|useless|unusable|unserviceable|unavailable|inoper\w*|incapacitated|disabled|damag\w*"
-        r"|casualt\w*|finished|done for|crapped|bust\w*|ruined|(is|went|has gone|gone) down|down"
+        r"|casualt\w*|finished|done for|crapped|bust\w*|ruined|(is|went|has gone"
+        r"|gone) down(?! (the|at|by|to))|down(?! (the|at|by|to))"
         r"|(is|are|s) out|offline|off-line|gone|collaps\w*|defunct|unresponsive|stuck|wrong with"
         r"|shot|fried|jammed|written|lifeless|(lost|no|out of) (power|battery|wheel)"
     ),
@@ -45,25 +49,30 @@ _SAYS: Mapping[str, str] = {
         r"remov\w*|delet\w*|clear\w*|eras\w*|tak(e|en|ing) (\w+ |<\w+> ){0,3}(away|off|out|down"
         r"|back)|took|drop\w*|rid|unmark\w*|wip\w*|discard\w*|gone|no (longer|more)"
         r"|any ?(more|longer)|away|dismantl\w*|lift\w*|clean\w*|open\w*|free\w*|disappear\w*"
-        r"|vanish\w*|torn|demolish\w*|pulled|unblock\w*|moved (it |them )?(away|out|aside|off|elsewhere|to the side)|rm|strike|scratch|cancel\w*|passable"
+        r"|vanish\w*|torn|tore|demolish\w*|pulled|unblock\w*|moved (it |them )?(away|out|aside|off"
+        r"|elsewhere|to the side)|rm|strike|scratch|cancel\w*|passable"
         r"|pass|picked up|forget|carried|collected|out of the way|outta|out there|disregard"
         r"|undone|left|fixed|down|off the|mopped|swept|towed|scrap|history|ignore"
     ),
     "obstacle_update": (
         r"block\w*|clos\w*|impass\w*|obstruct\w*|shut|cut off|cordon\w*|passable|off ?-?limits"
-        r"|out of bounds|inaccessible|unusable|barred|sealed|(there|here|this|that|it|now|way|which) "
+        r"|out of bounds|inaccessible|unusable|barred|sealed|(there|here|this|that|it|now|way"
+        r"|which) "
         r"(is|are|stands?|lies|sits)|now|appear\w*|mark\w*|add|put|draw|register|report\w*|new"
         r"|found|detect\w*|discover\w*|identif\w*|spott\w*|see|seen|saw|sight\w*|sens\w*|notic\w*"
         r"|stand(s|ing)|ly?ing|lies|laid|left|plac\w*|buil[dt]|erect\w*|install\w*|f[ea]ll\w*"
-        r"|spill\w*|tipped|collaps\w*|no (\w+ )?(entry|access|way|through\w*|passage|go|driving|entering)"
+        r"|spill\w*|tipped|collaps\w*|no (\w+ )?(entry|access|way|through\w*|passage|go|driving"
+        r"|entering)"
         r"|forbidden|prohibited|keep (out|clear|away)|avoid|in the way|reach(es|ing)|stretch\w*"
         r"|span\w*|occup\w*|cover\w*|head\w* up|beware|careful|watch|caution|warning|got|have|has"
         r"|corners?|polygon|dump\w*|dropp\w*|park\w*|jamm\w*|denied|stuck|creat\w*|enter|log"
         r"|set|includ\w*|insert|map|(not|cannot|no longer|nobody|no one|no robot|nothing|none) "
         r"(\w+ ){0,3}(pass\w*|cross\w*|us\w+|driv\w*|go|get\w*|through|enter\w*|travers\w*"
-        r"|accessible|free|clear|open|available|navigable|reachable)|going up|gone up|set up|came up"
+        r"|accessible|free|clear|open|available|navigable|reachable)|going up|gone up|set up"
+        r"|came up"
         r"|come up|pop\w*|note|ends?|finish\w*|across|starts?|begin\w*|consider"
-        r"|treat|declare|place|record|went up|sprung|emerged|turned up|locate\w*|crosses|runs"
+        r"|treat|declare|place|record|went up|sprung|emerged|turned up|hang\w*|lean\w*"
+        r"|protrud\w*|dangl\w*|planted|gr[eo]w\w*|locate\w*|crosses|runs"
     ),
     "pause_robot": (
         r"stop\w*|paus\w*|hold\w*|halt\w*|freez\w*|frozen|wait\w*|park\w*|stay\w*|stand\w*|still"
@@ -77,7 +86,9 @@ _SAYS: Mapping[str, str] = {
         r"|roll\w*|again|back|green|work\w*|on|off|up|may|can|clear\w*|unlock\w*|set|activ\w*"
     ),
 }
-_EVIDENCE = {intent: re.compile(rf"(?<![\w<])(?:{words})(?![\w>])") for intent, words in _SAYS.items()}
+_EVIDENCE = {
+    intent: re.compile(rf"(?<![\w<])(?:{words})(?![\w>])") for intent, words in _SAYS.items()
+}
 
 _NEGATED = re.compile(
     r"\b(not|never|hardly|barely|nearly|almost|scarcely|half|partly|partially|without|neither|nor"
@@ -89,6 +100,25 @@ _NEGATED = re.compile(
 _STATES = ("robot_failed", "remove_obstacle")
 """Intents that tell how things are."""
 
+_ATTITUDE = re.compile(
+    r"\b(regret\w*|remind\w*|remember\w*|talk\w* (about|of)|discuss\w*|speak\w* (about|of)|debat\w*"
+    r"|recall\w*|warned|convinc\w*|promis\w*|threaten\w*|discourag\w*|explain\w*|describ\w*"
+    r"|advis(e|es) (against|me|us)|persuad\w*|prevent\w*|imagin\w*|(let|keep) (me|us) (know|posted"
+    r"|informed)|tell (me|us) (how|when|if|what|which|who|about|of)|notify|alert (me|us)"
+    r"|ask (?!you\b"
+    r"|for\b|that\b|to\b)\w+|apologi[sz]e\w*|joking|kidding|just testing|hypothetical\w*|in theory"
+    r"|theoretically|on paper|for example|for instance|e\.g|such as)\b"
+)
+"""Verbs that speak of an instruction, or of its wording, instead of giving it."""
+_TAG = re.compile(
+    r", ?(is|are|was|were|has|have|does|do|did|will|would|can|should) (not )?(it|they|he|she|that"
+    r"|there|<\w+>)( not)?\W*$"
+)
+_WOULD_BE = re.compile(
+    r"(?<!it )(?<!that )(?<!which )\bwould (be (?!\w+ed\b|for\b|to\b|at\b|going\b|<)|make|cost|help"
+    r"|take|mean|annoy|upset|suit)"
+)
+
 _NOBODY = re.compile(
     r"\b(nobody|no one|noone|nothing|none|neither)( has| have| had| is| are| was| should| must| may"
     r"| will| can| could| would| ever| yet| really| to| be| dare| needs?)* (cancel|stop|paus|block"
@@ -97,11 +127,13 @@ _NOBODY = re.compile(
 )
 _GERUND = re.compile(
     r"^\W*(cancell?|paus|stopp|hold|add|rais|lower|remov|delet|resum|clos|block|bring|tak|mov|undo"
-    r"|mark|deliver|prioriti[sz]|dropp|halt|abort|restart|chang|revert|do|put|mak|giv)ing [^.!;]*\b(would|could|might|will|may|is|was|costs?|takes?|took|means?"
+    r"|mark|deliver|prioriti[sz]|dropp|halt|abort|restart|chang|revert|do|put|mak"
+    r"|giv)ing [^.!;]*\b(would|could|might|will|may|is|was|costs?|takes?|took|means?"
     r"|seems?|annoys?|hurts?|helps?|makes?|makes no|had|has)\b"
 )
 _REPORTS = re.compile(
-    r"<robot> (\w+ly |just |already |also |now )?(stops|stopped|waits|waited|holds|held|pauses|paused"
+    r"<robot> (\w+ly |just |already |also |now )?(stops|stopped|waits|waited|holds|held|pauses"
+    r"|paused"
     r"|halts|halted|stood|keeps|stays|stayed|parks|parked|rests|freezes|froze|resumed|resumes"
     r"|continues|continued|went|drives|drove|moves|moved|(is|was|got|has been|had been|are|were) "
     r"(\w+ )?(stopped|stopping|waiting|paused|standing|parked|halted|held|on hold|still|moving"
@@ -110,13 +142,16 @@ _REPORTS = re.compile(
 _NOT_THIS = re.compile(r"\b(not|never) <(label|robot|obstacle|point|place)>")
 _TELLS_OF = re.compile(
     r"^\W*(the|this|that|our|my|a|an) (\w+ )?<kind> (from|between|at|along)\b.*<point>.*?"
-    r"\b(was|were|could|might|may|should|would|needs?|has been (painted|checked|repaired|inspected))"
-    r"\b|\b(drove|walked|went|drives|drive|goes|moved|ran) (along|past|by|around|over|from|through)\b"
+    r"\b(was|were|could|might|may|should|would|needs?|has been (painted|checked|repaired"
+    r"|inspected))"
+    r"\b|\b(drove|walked|went|drives|drive|goes|moved|ran) (along|past|by|around|over|from"
+    r"|through)\b"
 )
 
 _META = re.compile(
     r"^(?:\W|please |kindly |now |can you |could you |would you |ok |hey )*(?:write|repeat|print"
-    r"|translate|sing|spell|recite|compose|pronounce|rephrase|paraphrase|echo|output|rhyme|tell me a"
+    r"|translate|sing|spell|recite|compose|pronounce|rephrase|paraphrase|echo|output|rhyme"
+    r"|tell me a"
     r"|tell a|say (?:that|after|the|aloud|to|:|\")|read|rewrite|reply|respond|answer|guess|define"
     r"|quote|invent|make up|joke|dream)\b(?! (?:off|out)\b)|\bafter me\b"
     r"|\b(?:poem|song|joke|story|haiku|rhyme|essay|french|german|spanish|english|latin)\b"
@@ -129,8 +164,10 @@ _SAID = re.compile(
     r"|predict\w*|fears?|feared|doubts?|denie[sd]|deny|swears?|swore|thought|knew|dream\w*)\b"
 )
 _PLANNED = re.compile(
-    r"(?<!would )(?<!'d )\b(likes?|loves?|prefers?|enjoys?|hates?|refuses?) (to|\w+ing)\b|\bkee?p(s|t) "
-    r"(on )?\w+ing\b|\b(is|are|am|was|were|be) (also |just |now |all )?(going|about|planning|meant|hoping"
+    r"(?<!would )(?<!should )\b(likes?|loves?|prefers?|enjoys?|hates?|refuses?) (to|\w+ing)\b"
+    r"|\bkee?p(s|t) "
+    r"(on )?\w+ing\b|\b(is|are|am|was|were|be) (also |just |now |all )?(going|about|planning"
+    r"|meant|hoping"
     r"|intending|supposed|due|scheduled|expected|bound|likely|set|tempted|inclined) to "
     r"(?!be (brought|taken|carried|delivered|moved|picked|fetched|collected)\b)(?!need\b)"
     r"(?!the\b)(?!move\b)[a-z]+\b"
@@ -159,7 +196,7 @@ _PASSABLE = re.compile(
 _OFTEN = re.compile(
     r"\b(always|usually|often|sometimes|generally|typically|rarely|seldom|occasionally|mostly"
     r"|frequently|ever since|every now and then|now and then|from time to time|on occasion"
-    r"|regularly)\b"
+    r"|regularly|weekdays|weekends|\w+days(?<!nowadays)|mornings|evenings|nights|holidays)\b"
 )
 _DEGREE = re.compile(
     r"\b(nearly|almost|hardly|barely|scarcely|partly|partially|half-?way|practically"
@@ -182,23 +219,61 @@ _ALL = re.compile(
     r"|any|none|either|two|three|four)\b(?! (?:right|set|done|good|the same|of a sudden))"
 )
 _WHERE = re.compile(
+    r"^[^,.;]*<robot> (right |just )?(at|in front of|near|behind|before|after|by|next to|outside)"
+    r" (?!once|the moment|the spot|its|the time|least|all|this point)|"
     r"\b(at|in|near|before|after|behind|by|beside|until|on reaching|in front of|next to|outside"
     r"|inside|close to|towards|to) (the |your |its |room |point |station |place )*<(place|point)>"
 )
 _LESS = re.compile(
     r"\b(low|slow\w*|weak|acting|strange|odd|oddly|weird\w*|funny|soon|late|lagging|wobbl\w*|noisy"
     r"|behaving|behaves|misbehav\w*|tired|sluggish|squeak\w*|charging|recharg\w*|warm|hot|dirty"
-    r"|failed (its|his|her|the|at|on|<\w+>|to (?!start|boot|move|restart|come|power))|favou?rite|struggl\w*"
+    r"|failed (its|his|her|the|at|on|<\w+>|to (?!start|boot|move|restart|come|power))"
+    r"|favou?rite|struggl\w*"
     r"|flickers?|hesitat\w*|shak\w+|delay\w*|battery is)\b"
 )
+_VITAL = (
+    r"wheels?|battery|batteries|motors?|engine|drive|axles?|computer|electronics|controller|power"
+    r"|gearbox|gears?|chassis|transmission|brain|cpu|left|right|front|rear|main|tracks?|mainboard"
+)
+_PART = re.compile(
+    rf"<robot> (?!(?:{_VITAL}|just|now|also|really|again|too|and|so|but|he|it|she|that|which"
+    rf"|\w+ly|all|"
+    r"has|have|had|is|was|went|got|who|broke|fell|died|gave|seems|there|then|please|i|we|over"
+    r"|unit|as|for|from|off|out|of|from|with|to|not)"
+    r"\b)\w+ (is|are|was|were|has|have|died|broke|failed|burnt|burned|went|got|fell|came|does|do)\b"
+    rf"|\b(?!(?:{_VITAL}|out|instead|loss|failure|breakdown|rid|because|death|end|work|tasks|jobs"
+    r"|case|part|all|both|hold|sight|off|signal|sign|life|one|death)\b)\w+ of (the )?<robot>"
+    r"|\b(into|with|against|by|than|like|for|from|after|before|behind) <robot>.*<robot>"
+    r"|<robot>.*\b(into|with|against|by|than|like|for|from|after|before|behind) (the )?<robot>"
+)
+"""A part of a robot, or another one, is what is spoken of."""
+_FOR = re.compile(r"\b(for|behind|after|until|with|from|by|before) (the |task )*<(robot|label)>")
+_TAKEN_BACK = re.compile(
+    r"\b(better not|rather not|(on|having) second thoughts?|no ,? ?wait|wait ,? ?no"
+    r"|or (rather )?wait"
+    r"|or not|actually ,? ?(no|not)|maybe not|hang on|strike that|nah|no ,? do not"
+    r"|please do not|or no)\b"
+)
+_BUT = re.compile(r"\bbut (?!(?:please|now|first|thanks|thank|quickly|fast|hurry|quick)\b)[^<]*$")
+_CAME = re.compile(
+    r"\b(came|comes|arrived|arrives|stems|originates?|originated|was (taken|brought|carried|moved"
+    r"|delivered|bought)|(i|we|he|she|they) (\w+ly |just |have |had )?(walked|drove|driven|ran|took"
+    r"|taken|brought|carried|delivered|moved|went|transported|dropped|strolled|hiked|cycled)"
+    r"|got here|is (about )?<number>|it is <number>|it takes|it took|measures)\b"
+    r"(?! (in|up|at|now)\b)"
+)
+
 _GONE_OFF = re.compile(
-    r"\b(dead|died|dies|broke\w*|fail(ed)?(?! (to|its|his|her|the|at|on|<\w+>)\b)|crash\w*|burn\w*|wreck\w*|out of (order|service"
+    r"\b(dead|died|dies|broke\w*|fail(ed)?(?! (to|its|his|her|the|at|on|<\w+>)\b)|crash\w*"
+    r"|burn\w*|wreck\w*|out of (order|service"
     r"|action)|write|written|count|consider|kaput\w*|toast|finished|bust\w*|empty|flat)\b"
 )
 
 _ASKED = re.compile(
-    r"\?|^(?:\W|so |and |hey |hi |hello |please |well |ok |okay |now |just |sorry |then )*(?:how|what"
-    r"|where|which|who|when|is|are|do|does|did|has|have|can|could|would|will|may|show|tell|give|list"
+    r"\?|^(?:\W|so |and |hey |hi |hello |please |well |ok |okay |now |just |sorry "
+    r"|then )*(?:how|what"
+    r"|where|which|who|when|is|are|do|does|did|has|have|can|could|would|will|may|show|tell|give"
+    r"|list"
     r"|report|status|let|check|read|describe|summari[sz]e|explain|i)\b"
     r"|\b(status|progress|report|update|summary|overview|sitrep|state|tell|show|news|list|know"
     r"|brief|rundown|recap|inform|see|stand|eta|situation)\b"
@@ -220,9 +295,11 @@ _MEANING = re.compile(
 
 
 _TERSE = re.compile(
-    r"(?:\W|\d|please |over |ok |obstacle |obstruction |barrier |blockage |object |thing |a |an |the "
+    r"(?:\W|\d|please |over |ok |obstacle |obstruction |barrier |blockage |object |thing |a "
+    r"|an |the "
     r"|from |to |between |and |at |along |through |until |til |till |up |down |of |with |points? "
-    r"|line |id |type |kind |control |team |attention |copy |hey |hi |also |plus |then |be advised |passage |aisle |corridor |route |way |path |long "
+    r"|line |id |type |kind |control |team |attention |copy |hey |hi |also |plus |then "
+    r"|be advised |there |here |passage |aisle |corridor |route |way |path |long "
     r"|area |zone |line |segment |running |runs |go(?:es|ing) |<\w+> ?)*"
     r"(?:over|please|thanks|obstacle|out|copy)?\W*"
 )
@@ -234,7 +311,15 @@ def unclear(line: str, intent: str) -> str | None:
     if _META.search(line) and intent != "query_status":
         return "I take instructions about the mission only, so I change nothing."
     if intent == "query_status":
-        fair = _ASKED.search(line) and _OF_MISSION.search(line) and not _MEANING.search(line)
+        later = re.search(
+            r"\b(know|tell me|notify|warn|alert|inform) (\w+ )?(as soon|once|when <)", line
+        )
+        fair = (
+            not later
+            and _ASKED.search(line)
+            and _OF_MISSION.search(line)
+            and not _MEANING.search(line)
+        )
         return None if fair else "I can tell how the mission stands, and nothing else."
     if _SAID.search(line):
         return "That is what somebody else says, so I change nothing."
@@ -246,10 +331,22 @@ def unclear(line: str, intent: str) -> str | None:
         return "That is not so yet, so I change nothing."
     if _NOBODY.search(line) or _GERUND.search(line):
         return "You say what not to do, or what it would be like, so I change nothing."
-    if len(re.findall(r"<(label|robot|obstacle|point|place)>", line)) > 1 and _NOT_THIS.search(line):
+    if len(re.findall(r"<(label|robot|obstacle|point|place)>", line)) > 1 and _NOT_THIS.search(
+        line
+    ):
         return "One at a time, please; I change nothing yet."
     if _DEGREE.search(line):
         return "You say that it is not quite so, so I change nothing."
+    if _ATTITUDE.search(line) or _TAG.search(line):
+        return "You speak of it, and do not say plainly that it is so."
+    if intent in ("add_task", "obstacle_update") and _WOULD_BE.search(line):
+        return "That is not so now, so I change nothing yet."
+    if _TAKEN_BACK.search(line) and intent not in ("undo", "pause_robot"):
+        return "You take that back, so I change nothing."
+    if intent != "obstacle_update" and (found := _BUT.search(line)):
+        means = _EVIDENCE.get(intent)
+        if means is None or not means.search(found[0]) or intent == "resume_robot":
+            return "I can do only what you say before 'but'."
     return _of_one(line, intent)
 
 
@@ -259,9 +356,17 @@ def _of_one(line: str, intent: str) -> str | None:
         found = list(_EVIDENCE[intent].finditer(line))
         if not found and not _TERSE.fullmatch(line):
             return "I am not sure what is to be done."
-        if intent in _STATES and all(_NEGATED.search(line[: one.start()].rstrip()) for one in found):
+        if intent in _STATES and all(
+            _NEGATED.search(line[: one.start()].rstrip()) for one in found
+        ):
             return "You say that it is not so, so I change nothing."
     match intent:
+        case "undo" if re.search(
+            r"^\W*(can|could|may|is|does|do|will|might) (one|i|it|anyone|everybody|people|somebody"
+            r"|users?|this|that)\b|\bwhat (?!i\b|you\b|we\b|was\b|is\b|has\b)\w+ \w+",
+            line,
+        ):
+            return "Say 'undo the last change' if that is meant."
         case "undo" if re.search(r"\bbut\b|<(?!number)\w+>", line):
             return "I undo the last change only. Say 'undo the last change' if that is meant."
         case "undo" if _ALL.search(line) or re.search(r"\b(since|first|from|last \w+s)\b", line):
@@ -282,6 +387,17 @@ def _of_one(line: str, intent: str) -> str | None:
             return "I cannot change an obstacle; remove it and add it anew."
         case "pause_robot" if _WHERE.search(line):
             return "I can stop a robot where it is now, not at a place."
+        case "pause_robot" if _FOR.search(line):
+            return "I can stop a robot where it is now, and not for another."
+        case "robot_failed" if _PART.search(line):
+            return "Is the robot itself out of service? Say 'robot1 has failed' if it is."
+        case "remove_obstacle" if re.search(
+            r"\b(and|then) (re)?(build|move|put|place|set|bring|install|add|draw)\w* (it|them)",
+            line,
+        ):
+            return "One after the other: I take the obstacle off the map, or add one."
+        case "add_task" if _CAME.search(line):
+            return "Is that a task? Say 'new task at (5, 19.5), take it to b' if it is."
         case "robot_failed" if _LESS.search(line) and not _GONE_OFF.search(line):
             return "Is it out of service? Say 'robot1 has failed' if it is."
     return None

@@ -24,7 +24,8 @@ _DROP = re.compile(
     r"no thanks?|no thank you|nothing|not needed|let it be|do not bother|i changed my mind"
     r"|discard (?:it|that)"
     r"|no|nope|cancel|dismiss|ignore (?:it|that))(?: (?:please|then|anymore|again|now|after all"
-    r"|thanks|i was (wrong|mistaken)|my mistake|leave it( as it (is|was))?|leave (things|everything)"
+    r"|thanks|i was (wrong|mistaken)|my mistake|leave it( as it (is|was))?|leave (things"
+    r"|everything)"
     r" as (they|it) (are|is)|it is (fine|ok|okay|good)( as it is)?|sorry|,|\.|!))*\W*$"
 )
 

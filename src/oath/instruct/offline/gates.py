@@ -70,7 +70,8 @@ _NOT_AFTER_ALL = re.compile(
 
 _ASKS = re.compile(
     r"^(?:\W*(?:and|but|so|hey|hi|hello|ok|okay|well|um|sorry|please|now) )*"
-    r"(?:(?:(?:is|are)(?! (?:new|now|one|some|also|more|another|big|urgent)\b(?!.*\?))|was|were|does"
+    r"(?:(?:(?:is|are)(?! (?:new|now|one|some|also|more|another|big|urgent)\b(?!.*\?))|was|were"
+    r"|does"
     r"|did|has|had|why|who|whose|what|where|am)\b"
     r"|how (?!about)|which (?!is\b)"
     r"|when (?:is|are|was|will|do|does|did|can|should)\b"
@@ -82,7 +83,8 @@ _ASKS = re.compile(
     r"|continue|go|resume|proceed|stand|stay|halt|move|carry on|drive|start|freeze|be)\b)"
 )
 _ASKS_FOR = re.compile(
-    r"^(can|could|would|will) |\bi (want|need|would (like|love|need))\b|\bask you to\b|\b(can|could|would|will|may|might) (you|we|i|somebody|someone"
+    r"^(can|could|would|will) |\bi (want|need|would (like|love|need))\b|\bask you to\b|\b(can"
+    r"|could|would|will|may|might) (you|we|i|somebody|someone"
     r"|<robot>|u|one|anybody|anyone)\b"
     r"|\b(would|do) you mind\b|\bwhy (not|do not we|do not you)\b|\bhow about\b|\bmind (\w+ing)\b"
     r"|\bpossible to\b|\blet us\b|\bshall we\b|\bplease\b"
@@ -135,8 +137,10 @@ _TOLD = re.compile(
 _TOLD_BY_ME = re.compile(r"\b(as )?i (said|told you|mentioned|already said)\b")
 
 _PAST = re.compile(
-    r"\b((?<!from )yesterday|last (week|night|month|time|year|spring|summer|autumn|fall|winter|shift|"
-    r"season|quarter|monday|tuesday|wednesday|thursday|friday|saturday|sunday)|ago|earlier today|(?<!from )this morning"
+    r"\b((?<!from )yesterday|last (week|night|month|time|year|spring|summer|autumn|fall|winter"
+    r"|shift|"
+    r"season|quarter|monday|tuesday|wednesday|thursday|friday|saturday|sunday)|ago"
+    r"|earlier today|(?<!from )this morning"
     r"|previously|used to|(?:we|i|they) had|had been|formerly|back then|the other day|once upon"
     r"|on monday"
     r"|in the past)\b"
@@ -197,7 +201,8 @@ _LIMITS = re.compile(
     r"|hour|"
     r"morning|time|week|other)|each (?:day|hour|time)|twice|thrice|three times|times"
     r"|again and again"
-    r"|except|but not|apart from|other than|half of|most of|only if|at least|at most|per|percent|%)"
+    r"|except|but not|apart from|other than|half of|most of|only (?:if|on|in|when|as|until|after"
+    r"|while)|at least|at most|per|percent|%)"
     r"(?: |$)"
 )
 _NO_LIMIT = re.compile(
@@ -285,14 +290,24 @@ def not_meant(line: str, intent: str) -> str | None:
     return None
 
 
-_UNWANTED = re.compile(r"\bnot (want|need|ask) (<\w+>|you|me|us|him|anyone|the \w+) to\b")
+_UNWANTED = re.compile(
+    r"\bno (need|reason|point|use|sense|cause) (to|in|of|for) (\w+ )?(cancel|delet|remov|drop|abort"
+    r"|scrap|paus|stop|resum|rais|lower|undo|halt|hold|skip|add|chang)\w*|\bnot (want|need"
+    r"|ask) (<\w+>|you|me|us|him|anyone|the \w+) to\b"
+)
 _SOUND = re.compile(
     r"\b(is|has|did) not (been )?(broken?|dead|fail(ed)?|stuck|damaged|down|out|lost)\b"
 )
 
 
 def _is_denied(line: str, intent: str) -> bool:
-    if _UNWANTED.search(line) or (intent == "robot_failed" and _SOUND.search(line)):
+    if intent == "obstacle_update" and re.search(
+        r"\b(do not|never) (block|close|mark|add|put|draw|shut|fence|seal|wall)\b", line
+    ):
+        return True
+    if (_UNWANTED.search(line) and intent != "resume_robot") or (
+        intent == "robot_failed" and _SOUND.search(line)
+    ):
         return True
     rest = _NOT_AFTER_ALL.sub(" ", line)
     if intent in ("remove_obstacle", "cancel_task", "change_task_priority", "robot_failed"):
@@ -310,6 +325,10 @@ def _is_denied(line: str, intent: str) -> bool:
         rest = re.sub(r"\b(no|not) (way|passage|access|go|entry|through\w*|there|yet)\b", " ", rest)
         if re.search(r"\bthere is no\b|\bno (<kind>|obstacle|wall|blockage)\b", rest):
             return True
+    if intent == "resume_robot":
+        rest = re.sub(
+            r"\bno (need|reason|point) (to|in) (\w+ )?(hold|stop|keep|paus|wait)\w*", "", rest
+        )
     if intent == "robot_failed":
         rest = re.sub(r"\bnot (\w+ )?(mov|go|driv|work|run|start|react|answer)\w*\b", " ", rest)
     if intent == "cancel_task":
@@ -389,6 +408,25 @@ def strange(tokens: Sequence[Token], words: Container[str]) -> tuple[list[str], 
     """Words that no instruction in training had, and how many plain words there are."""
     plain = [one for one in tokens if one.kind == "word" and not _HARMLESS.fullmatch(one.text)]
     return [one.raw for one in plain if one.text not in words], len(plain)
+
+
+_CLAUSES = {",", ".", ";", ":", "!", "and", "because", "since", "so", "but", "as", "for", "-"}
+
+
+def foreign(tokens: Sequence[Token], words: Container[str]) -> str | None:
+    """A word that no instruction in training had, beside a name or in an instruction without."""
+    clauses: list[list[Token]] = [[]]
+    for token in tokens:
+        if token.text in _CLAUSES and token.kind in ("word", "mark"):
+            clauses.append([])
+        else:
+            clauses[-1].append(token)
+    named = [part for part in clauses if any(one.kind not in ("word", "mark") for one in part)]
+    for token in (one for part in named or clauses for one in part):
+        plain = token.kind == "word" and not _HARMLESS.fullmatch(token.text)
+        if plain and token.text not in words:
+            return token.raw
+    return None
 
 
 _VAGUE = re.compile(

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import SequenceMatcher
-from functools import lru_cache
+from functools import lru_cache, partial
 
 from oath.commands import Live
 from oath.instruct.offline.axes import read_axes
@@ -32,9 +32,11 @@ KINDS = {
     "wall", "barrier", "bush", "box", "gate", "fence", "rock", "spill", "hole", "tree", "crate",
     "pallet", "cart", "car", "forklift", "door", "plant", "table", "chair", "ladder", "truck",
     "puddle", "shelf", "rack", "cone", "debris", "rubble", "hedge", "stone", "boulder", "trolley",
-    "stretcher", "cable", "skip", "bucket", "hose", "sofa", "wheelchair", "bike", "bicycle", "lorry",
+    "stretcher", "cable", "skip", "bucket", "hose", "sofa", "wheelchair", "bike", "bicycle",
+    "lorry",
     "van", "tarpaulin", "beam", "pipe", "branch", "barrel", "drum", "bench", "fridge", "cabinet",
-    "dumpster", "trailer", "rope", "net", "curtain", "leak", "ditch", "trench", "railing", "bollard",
+    "dumpster", "trailer", "rope", "net", "curtain", "leak", "ditch", "trench", "railing",
+    "bollard",
     "column", "divider", "booth", "statue", "scooter", "desk", "wardrobe", "ramp", "cordon",
     "container", "cage", "pole", "pillar", "partition", "barricade", "scaffold", "scaffolding",
 }  # fmt: skip
@@ -43,7 +45,8 @@ KINDS = {
 ALL_ROBOTS = re.compile(
     r"\b(?:(?:all|every|each)(?: of)?(?: the| our| my| single)? (?:robots?|bots?|units?|machines?|"
     r"vehicles?|fleet)|everyone|everybody|everything|(?:the )?(?:whole|entire) (?:fleet|team)|"
-    r"the (?:fleet|robots|bots|team)|all units|all of them)\b"
+    r"the (?:fleet|robots|bots|team)|all units|all of them|all of you(?: robots)?|you all"
+    r"|you robots)\b"
 )
 
 _COMMON = frozenset(
@@ -203,12 +206,17 @@ def tag(text: str, names: Names) -> list[Token]:
     """Return the tokens of an instruction, its entities found."""
     tokens = read_numbers(lex(clean(text)))
     tokens = _named(tokens, names)
-    tokens = mended(tokens, names.words, lambda word: _mended(word, names) is not None)
+    tokens = mended(tokens, names.words, partial(_known, names))
     tokens = _numbered(tokens, names)
     tokens = read_points(read_axes(tokens))
     tokens = _all_robots(tokens)
     tokens = _unknown(tokens, names)
     return [_kind_or_type(tokens, n, names) for n in range(len(tokens))]
+
+
+def _known(names: Names, word: str) -> bool:
+    """Whether a word names something as it is, or with a slip."""
+    return word in names.types or _single(word) in names.kinds or _mended(word, names) is not None
 
 
 def _named(tokens: Sequence[Token], names: Names) -> list[Token]:
@@ -238,9 +246,9 @@ def _name(
     joined = "".join(_digits(one) for one in part)
     letters = spelled(part)
     last = before[-1].text if before and not before[-1].quoted else ""
-    if letters and (len(letters) > 1 or last in _BEFORE_PLACE | NOUNS["place"] | {"deliver"}):
-        if (found := _spelled(part, letters, names)) is not None:
-            return found
+    told_so = last in _BEFORE_PLACE | NOUNS["place"] | {"deliver"}
+    if letters and (len(letters) > 1 or told_so) and (found := _spelled(part, letters, names)):
+        return found
     raw = " ".join(one.raw for one in part)
     wanted = key(joined)
     fits = [(kind, known[wanted]) for kind, known in names.groups() if wanted in known]
@@ -307,10 +315,11 @@ def _numbered(tokens: Sequence[Token], names: Names) -> list[Token]:
     done: list[Token] = []
     for token in tokens:
         last = done[-1] if done else None
-        if token.kind == "number" and last is not None and last.text in _NUMBER:
-            if len(done) > 1 and done[-2].text in NOUNS["robot"]:
-                del done[-1]
-                last = done[-1]
+        said = [one.text for one in done[-2:]]
+        counted = len(said) == 2 and said[0] in NOUNS["robot"] and said[1] in _NUMBER
+        if token.kind == "number" and counted:  # "robot number 3"
+            last = done[-2]
+            del done[-1]
         if token.kind == "number" and last is not None and last.text in NOUNS["robot"]:
             found = by_number.get(_digits(token), [])
             name = found[0] if len(found) == 1 else None

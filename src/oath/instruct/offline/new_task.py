@@ -14,8 +14,11 @@ _LOW = re.compile(
     r"\b(low(est|er)?( |-)?priority|priority (is |of |to |at |: |= )*(low\w*|minimum)|(not"
     r"|no longer|less|least|"
     r"isn't) (so |that |very |really |too )?(urgent|important|pressing|critical)|no (rush|hurry|"
-    r"urgency|pressure)|low|(?<!not )(?<!hardly )(?<!never )can wait|at the end|lowest|whenever (you|there|it)|unimportant|"
-    r"take your time|depriorit\w+|downgrad\w+|demot\w+|last|when (you have|there is) (some |)time|not in a hurry)\b"
+    r"urgency|pressure)|low|(?<!not )(?<!hardly )(?<!never )can wait|at the end|lowest"
+    r"|whenever (you|there|it)|unimportant|"
+    r"take your time|nothing (urgent|pressing|important)|all the time in the world"
+    r"|plenty of time|depriorit\w+|downgrad\w+|demot\w+"
+    r"|last|when (you have|there is) (some |)time|not in a hurry)\b"
 )
 _HIGH = re.compile(
     r"\b((?<!not )(?<!no longer )(?<!not so )(?<!not very )(?<!not that )(urgent(ly)?|asap"
@@ -23,7 +26,8 @@ _HIGH = re.compile(
     r"(high(est|er)?|top|maximum|first|max)( |-)?priority|priority (is |of |to |at |: "
     r"|= )*(high\w*|urgent|top|1|one)|"
     r"as soon as possible|immediately|right away|at once|emergency|rush|high|quickly|"
-    r"with priority|straight away|without delay|before (all|everything|anything)( else"
+    r"(can|could|must|should|may) not wait|with priority|straight away|without delay"
+    r"|before (all|everything|anything)( else"
     r"| others?)?)\b"
 )
 _NORMAL = re.compile(
@@ -173,7 +177,10 @@ def read_new_label(heard: Heard, filled: Filled) -> None:
         before = [
             one.text for one in heard.tokens[max(n - 5, 0) : n] if one.kind in ("word", "mark")
         ]
-        cued = any(_NEW_LABEL.match(" ".join(before[k:])) for k in range(len(before)))
+        after = " ".join(one.text for one in heard.tokens[n + 1 : n + 4])
+        cued = bool(re.match(r"as (its |the |a )?(label|id|name|identifier)\b", after)) or any(
+            _NEW_LABEL.match(" ".join(before[k:])) for k in range(len(before))
+        )
         if token.kind == "unknown_label" or (
             cued
             and token.kind in ("word", "label", "place", "robot", "type", "number")
@@ -188,6 +195,8 @@ def read_new_label(heard: Heard, filled: Filled) -> None:
             )
     if len(set(labels)) > 1:
         filled.object_to(f"Which label: {' or '.join(labels)}?", "task_label")
+    elif not labels and (odd := _unused(heard)):
+        filled.object_to(f"What is '{odd.raw}'? If it is the label, say 'label {odd.raw}'.")
     elif labels:
         filled.parameters["task_label"] = labels[0]
         known = {one.casefold(): one for one in heard.live.state.labels}
@@ -195,6 +204,14 @@ def read_new_label(heard: Heard, filled: Filled) -> None:
             filled.object_to(
                 f"The label {known[labels[0].casefold()]} is taken. Give another one.", "task_label"
             )
+
+
+def _unused(heard: Heard) -> Token | None:
+    """A word such as ``q9`` that can only be a label, but is not said to be."""
+    for token in heard.tokens:
+        if token.kind == "word" and re.fullmatch(r"[a-z]{1,4}[-_]?\d{1,4}", token.text):
+            return token
+    return None
 
 
 def read_type(heard: Heard, filled: Filled) -> None:

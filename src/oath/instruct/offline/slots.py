@@ -115,8 +115,10 @@ def _read_changed_priority(heard: Heard, filled: Filled, meant: str | None) -> N
 
 
 _THING = re.compile(
-    r"\b(?:a|an|some) (?:big |large |huge |broken |small |long )?([a-z]{3,20}) (?:is|has|was|blocks?"
-    r"|blocking|lying|lies|stands?|standing|sits?|sitting|from|across|between|along|in|on|at|fell)\b"
+    r"\b(?:a|an|some) (?:big |large |huge |broken |small |long )?([a-z]{3,20}) (?:is|has|was"
+    r"|blocks?"
+    r"|blocking|lying|lies|stands?|standing|sits?|sitting|from|across|between|along|in|on|at"
+    r"|fell)\b"
 )
 """An obstacle told by a noun that nobody foresaw."""
 
@@ -135,9 +137,8 @@ def _obstacle_to_add(heard: Heard, filled: Filled) -> None:
         filled.parameters["obstacle_type"] = kinds[0]
     elif kinds:
         filled.object_to(f"Which kind: {' or '.join(kinds)}?", "obstacle_type")
-    elif noun := _THING.search(heard.line):
-        if noun[1] not in heard.models.words:
-            filled.parameters["obstacle_type"] = noun[1]
+    elif (noun := _THING.search(heard.line)) and noun[1] not in heard.models.words:
+        filled.parameters["obstacle_type"] = noun[1]
     if unknown := heard.of("unknown_place"):
         filled.object_to(
             questions.unknown_place(heard, unknown[0]) + " " + questions.ask_extent(),
@@ -237,7 +238,9 @@ def _robot(heard: Heard, filled: Filled) -> None:
         filled.missing.append("robot")
 
 
-_EMERGENCY = re.compile(r"\b(emergency stop|e-stop|estop|stop (all|everything|everybody|everyone))\b")
+_EMERGENCY = re.compile(
+    r"\b(emergency stop|e-stop|estop|stop (all|everything|everybody|everyone))\b"
+)
 
 
 def _paused_robot(heard: Heard, filled: Filled) -> None:

@@ -27,7 +27,9 @@ def spelled(part: Sequence[Token]) -> str | None:
     if any(one.kind != "word" or one.quoted for one in part):
         return None
     words = [
-        word for one in part for word in ([one.text] if one.text in ALPHABET else one.text.split("-"))
+        word
+        for one in part
+        for word in ([one.text] if one.text in ALPHABET else one.text.split("-"))
     ]
     if not all(word in ALPHABET for word in words):
         return None
@@ -46,16 +48,19 @@ _SHORT = {
 }  # fmt: skip
 """Slips in words too short to be mended by themselves."""
 
-CORE = frozenset(
-    "add cancel delete remove pause stop resume continue undo revert status progress priority task "
-    "robot obstacle wall barrier blocked blocking closed deliver delivery pickup pick-up take bring "
-    "carry transport from there urgent important increase decrease raise lower failed broken broke "
-    "down dead obstacle please first last before after cancelled restart release halt freeze "
-    "location destination position coordinates between label point station high normal special "
-    "create insert register fetch collect drop-off reported removed cleared anymore needed longer "
-    "blockage obstruction should would could because special mission prioritize fence pallet "
-    "expedite immediately emergency".split()
-)
+CORE = {
+    "add", "after", "anymore", "barrier", "because", "before", "between", "blockage", "blocked",
+    "blocking", "bring", "broke", "broken", "cancel", "cancelled", "carry", "cleared", "closed",
+    "collect", "continue", "coordinates", "could", "create", "dead", "decrease", "delete",
+    "deliver", "delivery", "destination", "down", "drop-off", "emergency", "expedite", "failed",
+    "fence", "fetch", "first", "freeze", "from", "halt", "high", "immediately", "important",
+    "increase", "insert", "label", "last", "location", "longer", "lower", "mission", "needed",
+    "normal", "obstacle", "obstruction", "pallet", "pause", "pick-up", "pickup", "please",
+    "point", "position", "prioritize", "priority", "progress", "raise", "register", "release",
+    "remove", "removed", "reported", "restart", "resume", "revert", "robot", "should", "special",
+    "station", "status", "stop", "take", "task", "there", "transport", "undo", "urgent", "wall",
+    "would",
+}  # fmt: skip
 """Words that an instruction turns on: the likelier ones, if a slip may be of several."""
 
 
@@ -69,14 +74,14 @@ def mended(
 def _mended(token: Token, words: frozenset[str]) -> Token:
     if token.kind != "word" or token.quoted or token.text in words or token.text in ALPHABET:
         return token
-    if token.text in _guarding() or token.raw.isupper() and len(token.raw) < 4:
+    if token.text in guarding() or (token.raw.isupper() and len(token.raw) < 4):
         return token
     word = nearest(token.text, words)
     return token if word is None else replace(token, text=word)
 
 
 @cache
-def _guarding() -> frozenset[str]:
+def guarding() -> frozenset[str]:
     """Words that are right as they are, for a gate looks for them."""
     return gates.guarding() | clear.guarding()
 

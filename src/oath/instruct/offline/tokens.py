@@ -283,7 +283,20 @@ def _not_one(tokens: Sequence[Token], at: int) -> Token:
 
 _BETWEEN = {",", ";", "/", "|", "and", "&", "comma"}
 _LOOSE = {"by", "-", "x"}
-_BEFORE_LOOSE = {"at", "position", "location", "coordinates", "coordinate", "grid", "point", "spot"}
+_BEFORE_LOOSE = {
+    "at",
+    "position",
+    "location",
+    "coordinates",
+    "coordinate",
+    "grid",
+    "point",
+    "spot",
+    "pick-up",
+    "pickup",
+    "origin",
+    "source",
+}
 _METERS = {"m", "meter", "meters"}
 _EQUALS = {"=", ":", "is", "equals", "of", "at", "coordinate", "equal", "to"}
 _CLOSE = {"(": ")", "[": "]", "{": "}", "<": ">"}
@@ -359,7 +372,14 @@ def _by_axes(tokens: Sequence[Token], at: int) -> tuple[list[Token], int]:
 
 def _run(tokens: Sequence[Token], at: int, before: Token | None) -> tuple[list[Token], int]:
     """Read numbers in a row as pairs, if their number and what separates them allow it."""
-    if before is not None and before.text in _BEFORE_LOOSE and (found := _loose(tokens, at)):
+    told = before is not None and (
+        before.text in _BEFORE_LOOSE
+        or (
+            before.text in ("from", "to")
+            and [one.text for one in tokens[at + 1 : at + 2]] == ["by"]
+        )
+    )
+    if told and (found := _loose(tokens, at)):
         return found, at + 3
     numbers, gaps, end = [tokens[at]], list[str](), at + 1
     here = end

@@ -13,7 +13,16 @@ from oath.commands import COMMANDS, Command
 from oath.instruct import Reply
 from oath.instruct.offline import clear, gates, questions, slots
 from oath.instruct.offline.heard import Filled, Heard
+from oath.instruct.offline.names import NOUNS
+from oath.instruct.offline.spelling import guarding
 from oath.instruct.offline.tokens import Token
+
+_ROOMY = ("add_task", "obstacle_update", "query_status")
+"""Intents told with many words that do not matter, such as what is carried."""
+
+_ASIDES = frozenset(
+    ("oh", "uh", "um", "er", "eh", "ah", "hmm", "huh", "yo", "both", "guys", "folks", "mate", "ta")
+)
 
 LIKELY = 0.6
 """How probable an intent must be to be acted on."""
@@ -114,6 +123,14 @@ def _one(heard: Heard) -> Reply:
     if why := _in_one(heard, meant.intent):
         return Reply(status="clarification", intent=meant.intent, message=why)
     odd = len(gates.strange(heard.tokens, heard.models.words)[0])
+    foreign = meant.intent not in _ROOMY and gates.foreign(
+        heard.tokens, heard.models.words | guarding() | NOUNS["robot"] | _ASIDES
+    )
+    if foreign:
+        say = (
+            f"I do not know the word '{foreign}'. Say it plainly if I shall {ABOUT[meant.intent]}."
+        )
+        return Reply(status="clarification", intent=meant.intent, message=say)
     doubt = meant.share < LIKELY + 0.1 * odd or gates.speaks_against(heard.line, meant.intent)
     if doubt:
         return Reply(
