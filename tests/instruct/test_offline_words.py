@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from oath.instruct.offline.axes import read_axes
 from oath.instruct.offline.names import Names, slip, tag
 from oath.instruct.offline.tokens import clean, lex, read_numbers, read_points
 
@@ -27,7 +29,8 @@ def numbers(text: str) -> list[Any]:
 
 
 def points(text: str) -> list[Any]:
-    return [one.value for one in read_points(read_numbers(lex(clean(text)))) if one.kind == "point"]
+    tokens = read_axes(read_numbers(lex(clean(text))))
+    return [one.value for one in read_points(tokens) if one.kind == "point"]
 
 
 def kinds(text: str, kind: str) -> list[Any]:
@@ -137,7 +140,7 @@ def test_a_point_in_digits_is_read_as_it_is(x: int, y: int) -> None:
         ("deliver to bravo", "place", ["b"]),
         ("bravo says hello", "place", []),
         ("task zulu zulu", "unknown_label", [None]),
-        ("a wal and a stretcher", "kind", ["wall", "stretcher"]),
+        ("a wal and a stretcher", "kind", ["wall"]),
     ],
 )
 def test_names(text: str, kind: str, values: list[str | None]) -> None:
@@ -155,7 +158,9 @@ def test_names(text: str, kind: str, values: list[str | None]) -> None:
     ],
 )
 def test_slips_in_everyday_words_are_mended(text: str, words: str) -> None:
-    known = Names.of(LIVE, models().words) if False else WORLD
+    known = replace(
+        WORLD, words=frozenset(("cancel", "task", "the", "increase", "priority", "free"))
+    )
     assert " ".join(one.text for one in tag(text, known)) == words
 
 

@@ -7,7 +7,19 @@ from collections.abc import Sequence
 from oath.instruct.offline.tokens import Token, point_token
 
 _JOINS = {"=", ":", "is", "equals", "equal", "of", "at", "coordinate", "axis", "value", "values"}
-_OPENS = {"from", "between", "spans", "runs", "running", "goes", "ranges", "ranging", "over"}
+_OPENS = {
+    "from",
+    "between",
+    "spans",
+    "runs",
+    "running",
+    "goes",
+    "ranges",
+    "ranging",
+    "over",
+    "going",
+    "reaching",
+}
 _LINKS = {"and", ",", "at", "with"}
 _RANGES = {"to", "..", "...", "-", "until", "till", "through", "til", "->", "=>"}
 _STEPS = {"up", "all", "the", "way", "down", "reaching", "on", "coordinates"}

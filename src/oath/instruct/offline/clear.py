@@ -72,7 +72,7 @@ _SAYS: Mapping[str, str] = {
         r"|came up"
         r"|come up|pop\w*|note|ends?|finish\w*|across|starts?|begin\w*|consider"
         r"|treat|declare|place|record|went up|sprung|emerged|turned up|hang\w*|lean\w*"
-        r"|protrud\w*|dangl\w*|planted|gr[eo]w\w*|locate\w*|crosses|runs"
+        r"|protrud\w*|dangl\w*|planted|tak\w+ up|fill\w*|gr[eo]w\w*|locate\w*|crosses|runs"
     ),
     "pause_robot": (
         r"stop\w*|paus\w*|hold\w*|halt\w*|freez\w*|frozen|wait\w*|park\w*|stay\w*|stand\w*|still"

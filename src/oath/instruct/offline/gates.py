@@ -70,9 +70,8 @@ _NOT_AFTER_ALL = re.compile(
 
 _ASKS = re.compile(
     r"^(?:\W*(?:and|but|so|hey|hi|hello|ok|okay|well|um|sorry|please|now) )*"
-    r"(?:(?:(?:is|are)(?! (?:new|now|one|some|also|more|another|big|urgent)\b(?!.*\?))|was|were"
-    r"|does"
-    r"|did|has|had|why|who|whose|what|where|am)\b"
+    r"(?:(?:(?:is|are)(?! (?:possible to|new|now|one|some|also|more|another|big|urgent)\b(?!.*\?))"
+    r"|was|were|does|did|has|had|why|who|whose|what|where|am)\b"
     r"|how (?!about)|which (?!is\b)"
     r"|when (?:is|are|was|will|do|does|did|can|should)\b"
     r"|(?:do|have|should|shall|must|may|might) (?:you|we|i|they|it|he|she|the|a|any|robots|there"
@@ -279,7 +278,7 @@ def not_meant(line: str, intent: str) -> str | None:
             return "You say what not to do, so I change nothing."
         if intent == "pause_robot":
             line = re.sub(r"\b(un)?till? (i|we|you) \w+( so| otherwise)?[ .!]*$", " ", line)
-        if _IF.search(_IF_POLITE.sub(" ", line)):
+        if _IF.search(_IF_POLITE.sub(" ", line)) or re.search(r"\bif there (is|are)\b", line):
             return "I cannot wait for a condition, so I change nothing yet."
         if _TOLD.search(_TOLD_BY_ME.sub(" ", line)):
             return "That is what somebody else says, so I change nothing."
@@ -330,7 +329,12 @@ def _is_denied(line: str, intent: str) -> bool:
             r"\bno (need|reason|point) (to|in) (\w+ )?(hold|stop|keep|paus|wait)\w*", "", rest
         )
     if intent == "robot_failed":
-        rest = re.sub(r"\bnot (\w+ )?(mov|go|driv|work|run|start|react|answer)\w*\b", " ", rest)
+        rest = re.sub(
+            r"\bnot (\w+ )?(mov|go|driv|work|run|start|react|answer|plan|count|reckon|rely"
+            r"|use)\w*\b",
+            " ",
+            rest,
+        )
     if intent == "cancel_task":
         rest = re.sub(r"\bnot do (the )?(task |job |order )?<label>[ .!]*$", " ", rest)
     if intent == "pause_robot":

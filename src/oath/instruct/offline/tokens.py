@@ -398,7 +398,11 @@ def _run(tokens: Sequence[Token], at: int, before: Token | None) -> tuple[list[T
         here += 1
         end = here
     within = set(gaps[::2])
-    spoken = len(numbers) > 2 and all(one.raw.isalpha() for one in numbers) and within == {""}
+    spoken = (
+        len(numbers) > 2
+        and all(one.raw.replace(" ", "").isalpha() for one in numbers)
+        and within == {""}
+    )
     usable = (
         not (spoken and set(gaps) != {""})  # as "one two, one nine": digits or numbers?
         and len(numbers) % 2 == 0
