@@ -97,7 +97,7 @@ def pack(models: Models) -> bytes:
     }
     for name, one in (("intent", models.intent), ("role", models.role)):
         scale = np.abs(one.weights).max() / 127.0
-        keep = (np.abs(one.weights) >= scale).any(axis=1)
+        keep = np.ones(len(one.weights), dtype=bool)
         arrays[f"{name}_classes"] = _text(one.classes)
         arrays[f"{name}_features"] = _text([f for f, k in zip(one.rows, keep, strict=True) if k])
         arrays[f"{name}_weights"] = np.rint(one.weights[keep] / scale).astype(np.int8)
