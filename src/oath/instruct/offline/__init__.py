@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from oath.commands import Live
 from oath.instruct import Dialogue, Reply
+from oath.instruct.offline.asides import without_asides
 from oath.instruct.offline.dialogue import follow_up
 from oath.instruct.offline.heard import Heard
 from oath.instruct.offline.model import models
@@ -29,6 +32,18 @@ class Offline:
             return Reply(status="clarification", message=say)
         if not heard.tokens:
             return nothing(heard)
-        if dialogue.draft is not None:
-            return follow_up(heard, dialogue.draft)
-        return understand(heard)
+        reply = _reply(heard, dialogue)
+        if reply.status == "complete":
+            return reply
+        tokens = without_asides(heard.tokens, trained.words)
+        if tokens and len(tokens) < len(heard.tokens):
+            again = _reply(replace(heard, tokens=tokens), dialogue)
+            if again.status == "complete" or not reply.missing and again.missing:
+                return again
+        return reply
+
+
+def _reply(heard: Heard, dialogue: Dialogue) -> Reply:
+    if dialogue.draft is not None:
+        return follow_up(heard, dialogue.draft)
+    return understand(heard)

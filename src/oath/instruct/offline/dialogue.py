@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from oath.instruct.offline import gates, new_task, questions, slots
 from oath.instruct.offline.gates import as_line
 from oath.instruct.offline.heard import Filled, Heard
 from oath.instruct.offline.tokens import Token
+from oath.model import Point
 from oath.instruct.offline.understand import NEEDS, answer, meaning, understand
 
 _DROP = re.compile(
@@ -24,8 +25,7 @@ _DROP = re.compile(
     r"no thanks?|no thank you|nothing|not needed|let it be|do not bother|i changed my mind"
     r"|discard (?:it|that)"
     r"|no|nope|cancel|dismiss|ignore (?:it|that))(?: (?:please|then|anymore|again|now|after all"
-    r"|thanks|i was (wrong|mistaken)|my mistake|leave it( as it (is|was))?|leave (things"
-    r"|everything)"
+    r"|thanks|it is (still )?(there|needed|here)( after all)?|i was (wrong|mistaken)|my mistake|leave it( as it (is|was))?|leave (things|everything)"
     r" as (they|it) (are|is)|it is (fine|ok|okay|good)( as it is)?|sorry|,|\.|!))*\W*$"
 )
 
@@ -34,6 +34,9 @@ _CORRECTS = re.compile(
     r"|should be|make (?:it|that)"
     r"|wait|oops|better|set it|it is|it should)\b"
 )
+
+
+_ORDINALS = re.compile(r"\b(first|second|third|last) (point|end|corner|one|coordinate)\b")
 
 
 def follow_up(heard: Heard, draft: Draft) -> Reply:
@@ -51,7 +54,10 @@ def follow_up(heard: Heard, draft: Draft) -> Reply:
         if reply.intent is None or (reply.intent == draft.intent and not reply.parameters):
             return _again(heard, draft)
         return reply
-    why = gates.not_meant(heard.line, draft.intent)
+    if _AXIS.search(heard.line):
+        rest = tuple(one for one in heard.tokens if one.kind != "number")
+        heard = replace(heard, tokens=rest)
+    why = gates.not_meant(_ORDINALS.sub(" ", heard.line), draft.intent)
     if why is not None and not filled.trouble and "not to do" not in why:
         filled.object_to(f"{why} Say it plainly if that is meant.")
     return answer(heard, draft.intent, filled)
@@ -61,8 +67,10 @@ def _by_number(heard: Heard, draft: Draft) -> list[Token]:
     """Read ``2`` as robot2 where a robot is asked for."""
     tokens = list(heard.tokens)
     if "robot" in COMMANDS[draft.intent].model_fields:
+        robots = list(heard.live.state.robots)
         for n, token in enumerate(tokens):
-            fits = [one for one in heard.live.state.robots if re.sub(r"\D", "", one) == token.text]
+            number = f"{token.value:g}" if token.kind == "number" and token.value else token.text
+            fits = [one for one in robots if re.sub(r"\D", "", one) == number]
             if token.kind == "number" and len(fits) == 1:
                 tokens[n] = replace(token, kind="robot", value=fits[0])
     return tokens
@@ -87,8 +95,20 @@ def _again(heard: Heard, draft: Draft) -> Reply:
     )
 
 
+_ANSWERS = re.compile(
+    r"(?:\W|(?:it|that|this|the|is|are|one|task|job|robot|number|no|nr|label|id|called|named|please|thanks"
+    r"|thank|you|with|for|i|mean|meant|want|take|make|of|course|would|be|called|my|mistake|sorry|ok"
+    r"|okay|yes|um|uh|er|well|oh|a|an|kind|type|point|room|place|obstacle|at|in|to|from|and"
+    r"|between|should|could|must|go|goes|over|there|then|at|has|have|runs|reaches|until|till|up"
+    r"|let|say|try|choose|pick|just|only|name)\b|<\w+>)*"
+)
+"""Says no more than a value."""
+
+
 def _anew(heard: Heard, draft: Draft) -> bool:
     """Whether words are an instruction of their own and no answer."""
+    if draft.missing and _ANSWERS.fullmatch(heard.line) and _answers(heard, draft):
+        return False
     words = [one for one in heard.tokens if one.kind == "word"]
     told = {"robot", "label", "obstacle"} & {one.kind for one in heard.tokens}
     if len(words) < 2 and not (words and (words[0].text in _ALONE or told)):
@@ -108,6 +128,24 @@ def _anew(heard: Heard, draft: Draft) -> bool:
     if draft.intent == "add_task":
         return sum(one.kind in ("point", "place") for one in heard.tokens) >= 2 and len(words) > 3
     return names and len(words) > 3
+
+
+_VALUES: Mapping[str, frozenset[str]] = {
+    "task_label": frozenset({"label", "unknown_label"}),
+    "robot": frozenset({"robot", "unknown_robot"}),
+    "obstacle": frozenset({"obstacle", "unknown_obstacle"}),
+    "obstacle_location": frozenset({"point"}),
+    "location": frozenset({"point", "place", "unknown_place"}),
+    "delivery_point": frozenset({"point", "place", "unknown_place"}),
+}
+"""What tells the value of a parameter."""
+
+
+def _answers(heard: Heard, draft: Draft) -> bool:
+    """Whether words name just what was asked for."""
+    asked = frozenset[str]().union(*(_VALUES.get(one, frozenset()) for one in draft.missing))
+    named = {one.kind for one in heard.tokens} - {"word", "mark", "kind", "type"}
+    return bool(named) and named <= asked
 
 
 _ALONE = {"undo", "status", "stop", "halt", "freeze"}
@@ -174,6 +212,8 @@ _FROM = re.compile(
 
 
 def _fill_task(heard: Heard, draft: Draft, filled: Filled) -> None:
+    if _corrects_axis(heard, filled):
+        return
     extra = Filled()
     new_task.read_new_label(heard, extra)
     new_task.read_type(heard, extra)
@@ -207,6 +247,29 @@ def _fill_task(heard: Heard, draft: Draft, filled: Filled) -> None:
             new_task.read_spot(heard, filled, asked_for, spots[0])
 
 
+_AXIS = re.compile(
+    r"\b(x|y)(?: coordinate| value)?(?: (?:is|should|be|must|to|of|=|:|equals|must|needs|actually|has))* "
+    r"<number>[ .!]*$"
+)
+
+
+def _corrects_axis(heard: Heard, filled: Filled) -> bool:
+    """Correct one coordinate of the only point of a task, as in ``x should be 9``."""
+    axis = _AXIS.search(heard.line)
+    numbers = heard.of("number")
+    names = ("location", "delivery_point")
+    points = [one for one in names if isinstance(filled.parameters.get(one), (list, tuple))]
+    if axis is None or len(numbers) != 1 or numbers[0].value is None or len(points) != 1:
+        return False
+    x, y = filled.parameters[points[0]]
+    at = (float(numbers[0].value), y) if axis[1] == "x" else (x, float(numbers[0].value))
+    if why := questions.outside(heard, at):
+        filled.object_to(why, points[0])
+    else:
+        filled.parameters[points[0]] = list(at)
+    return True
+
+
 def _asked_spot(heard: Heard, draft: Draft, at: int) -> str | None:
     """Which of a task's two ends one place or point is; None if that is not clear."""
     before = as_line(heard.tokens[:at])
@@ -230,7 +293,7 @@ def _fill_obstacle(heard: Heard, filled: Filled) -> None:
     kinds = {str(one.value) for one in heard.of("kind")}
     if len(kinds) == 1:
         filled.parameters["obstacle_type"] = kinds.pop()
-    points = []
+    points: list[Point] = []
     for n, token in enumerate(heard.tokens):
         if token.kind == "point":
             if gates.is_vague(heard.tokens, n):
@@ -242,11 +305,20 @@ def _fill_obstacle(heard: Heard, filled: Filled) -> None:
     known = [tuple(one) for one in filled.parameters.get("obstacle_location", ())]
     if len(points) == 1 and len(known) == 1 and points != known:
         points = [*known, *points]
+    elif len(points) == 1 and len(known) == 2 and (end := _end(heard.line)) is not None:
+        points = [*known[:end], *points, *known[end + 1 :]]
     elif len(points) == 1 and len(known) > 1:
         filled.object_to(f"Which point is that? {questions.ask_extent()}", "obstacle_location")
         return
     if points:
         slots.add_points(heard, filled, points)
+
+
+def _end(line: str) -> int | None:
+    """Which end of a line one point is said to be; None if that is not clear."""
+    to = re.search(r"\b(to|until|till|ends?|end point|second|finish\w*|stops?|up to)\b.*<point>", line)
+    start = re.search(r"\b(from|starts?|begins?|beginning|start point|first)\b.*<point>", line)
+    return None if bool(to) == bool(start) else int(bool(to))
 
 
 def _fill_label(heard: Heard, draft: Draft, filled: Filled) -> None:

@@ -97,8 +97,8 @@ _ASKS_ABOUT = re.compile(
 )
 
 _IF = re.compile(
-    r"\b(if|unless|until(?! further| later| the (?:very )?end| last| every| all)"
-    r"|till(?! further| later| the (?:very )?end| last| every| all)|(?<!at )once|whenever"
+    r"\b(if|unless|until(?! <point>| \(| further| later| the (?:very )?end| last| every| all)"
+    r"|till(?! <point>| further| later| the (?:very )?end| last| every| all)|(?<!at )once|whenever"
     r"|in case|in the event|provided|assuming|assume|suppose|supposing"
     r"|imagine|as long as|except|depending|otherwise|in order of|pending)\b"
     r"|\b(when|after|while|as soon as|before)(?= (the |a |my |our )?(<\w+>|(?:i|you|we|it|he|she"
@@ -114,6 +114,11 @@ _IF_POLITE = re.compile(
     r" not mind|need be|a (chance|moment|minute|second))\b"
     r"|\bif (it|that|this) (is|would be|be) (ok|okay|all right|alright|fine|possible|convenient"
     r"|no (trouble|bother|problem)|not too (much|late)[a-z ]*|good|acceptable|allowed)\b"
+    r"|\bif (it|that|this) (is|would)( be)? not (too|asking|a|an|any) (\w+ ){0,3}(much|trouble|bother"
+    r"|hassle|problem|many|far|late|imposition|inconvenien\w*|burden)( to ask| of (you|a bother)| trouble)?\b"
+    r"|\bif (it|that) (pleases|suits|does not bother|is all the same to)( you)?\b"
+    r"|\bif (i|we) (might|could|can|dare|must)( (be so bold|ask|trouble you|bother you))?\b"
+    r"|\bif you (two|lot|guys|all|folks)? ?(have|find|get|got|would be so|could be so)\b"
     r"|\bif (i may|you please|you would|you will|you do not mind|that suits you)\b"
     r"|\b(appreciate|grateful|great|nice|good|glad|happy|lovely|helpful|thankful|wonderful|better"
     r"|obliged|kind|best)( it)? if\b"
@@ -128,7 +133,7 @@ _IF_POLITE = re.compile(
 _TOLD = re.compile(
     r"\b(said|told|(?:i|we) (?:have |just )?read(?: that)?|claims?|claimed|mentioned|heard"
     r"|according to|allegedly|rumou?rs?|thinks|believes"
-    r"|supposedly|wrote|states|announced|insists?|suspects?|quote|hearsay|reckons|texted|emailed"
+    r"|supposedly|wrote|states|announced|(?<!boss )(?<!director )(?<!manager )(?<!client )(?<!customer )(?<!chef )(?<!doctor )insists?|suspects?|quote|hearsay|reckons|texted|emailed"
     r"|reportedly|wants (me|us|you)|asked (me|us|you|to|if|whether))\b"
     r"|\b(?!it\b)\w+ says\b|\b(\w+) (?<!\bbe )(?<!\bto )(reports|reported) (that|there|a|an"
     r"|seeing)\b"
@@ -141,7 +146,7 @@ _PAST = re.compile(
     r"season|quarter|monday|tuesday|wednesday|thursday|friday|saturday|sunday)|ago"
     r"|earlier today|(?<!from )this morning"
     r"|previously|used to|(?:we|i|they) had|had been|formerly|back then|the other day|once upon"
-    r"|on monday"
+    r"|on monday|(in|during|on) (the|our|my) (previous|former|earlier|old|past|last) \w+"
     r"|in the past)\b"
     r"|(?<!\w)(i|we|he|she|they|you|someone|somebody|tom|<robot>|shift|operator|colleague) (have "
     r"|has |had |"
@@ -190,7 +195,7 @@ _COMPARES = re.compile(
     r"|but not|behind"
     r"|prior to|until) (task |job |the |both )*<label>|\b(before|after|than|over|ahead of"
     r"|instead of|"
-    r"rather than|swap|exchange|behind|between|same) (\w+ )*<label>"
+    r"rather than|swap|exchange|behind|between|same) (\w+ ){0,4}<label>"
     r"|\b(nearest|closest|farthest|furthest|biggest|smallest|longest|shortest|oldest|newest|same)\b"
 )
 
@@ -206,7 +211,7 @@ _LIMITS = re.compile(
 )
 _NO_LIMIT = re.compile(
     r"\b(for|hold on|wait|stop|pause) (a|one|some|few|a few) (minutes?|seconds?|moment|hours?)\b"
-    r"|\b(a|one|this) (minute|second|moment|sec|min)\b|\bmost (?:urgent|important)\b"
+    r"|\b(a|one|this|spare|free|any|half a|your) (spare |free |quick )?(minute|second|moment|sec|min|hour)\b|\bmost (?:urgent|important)\b"
     r"|\bat all times\b|\b(checked|looked|tried|asked|called|tested) (\w+ )?(twice|\w+ times)\b"
 )
 
@@ -260,14 +265,21 @@ def refused(line: str) -> str | None:
     return None
 
 
+def conditional(line: str) -> str | None:
+    """Why words are no instruction yet: they hang on a condition."""
+    if _IF.search(_IF_POLITE.sub(" ", line)) or re.search(r"\bif there (is|are)\b", line):
+        return "I cannot wait for a condition, so I change nothing yet."
+    return None
+
+
 def not_meant(line: str, intent: str) -> str | None:
     """Why words are no instruction although they sound like one; None if they may be one."""
     line = _NO_OTHER.sub(" ", line)
     if intent == "undo":
         if re.search(r"\b(not|never) (\w+ ){0,2}(undo|revert|reverse|take|roll|go|change)\b", line):
             return "You say what not to do, so I change nothing."
-        if _IF.search(_IF_POLITE.sub(" ", line)):
-            return "I cannot wait for a condition, so I change nothing yet."
+        if why := conditional(line):
+            return why
         if re.match(r"(what|why|when|who|how) (do|does|did|is|was|can|would|happens)\b", line):
             return "That sounds like a question, so I change nothing."
     elif intent != "query_status":
@@ -278,8 +290,8 @@ def not_meant(line: str, intent: str) -> str | None:
             return "You say what not to do, so I change nothing."
         if intent == "pause_robot":
             line = re.sub(r"\b(un)?till? (i|we|you) \w+( so| otherwise)?[ .!]*$", " ", line)
-        if _IF.search(_IF_POLITE.sub(" ", line)) or re.search(r"\bif there (is|are)\b", line):
-            return "I cannot wait for a condition, so I change nothing yet."
+        if why := conditional(line):
+            return why
         if _TOLD.search(_TOLD_BY_ME.sub(" ", line)):
             return "That is what somebody else says, so I change nothing."
         if _PAST.search(line) and not _excused_past(line, intent):
@@ -293,6 +305,15 @@ _UNWANTED = re.compile(
     r"\bno (need|reason|point|use|sense|cause) (to|in|of|for) (\w+ )?(cancel|delet|remov|drop|abort"
     r"|scrap|paus|stop|resum|rais|lower|undo|halt|hold|skip|add|chang)\w*|\bnot (want|need"
     r"|ask) (<\w+>|you|me|us|him|anyone|the \w+) to\b"
+)
+_PASSIVE = re.compile(
+    r"\b(should|must|need|needs|ought|may|can|could|will|is|are|does|do) not( to)? (be|being|need|get|require|have to be"
+    r"|need to be|want)( to be)? (\w+ly )?(paus|stop|halt|held|suspend|frozen|freez|cancel|remov|delet|drop|"
+    r"scrap|block|clos|rais|lower|add|resum|restart|releas|undone|revert|bump|prioriti|interrupt|wait)\w*"
+)
+_NONE_SUCH = re.compile(
+    r"\b(is|are|was|were) (not|never)( really| actually| even)? (any|a|an|one)\b|\bno such\b"
+    r"|\b(not|never) (see|find|spot|notice|have|got) (any|a|an)\b|\bno <kind>|\bnothing (is|at|between|from)\b"
 )
 _SOUND = re.compile(
     r"\b(is|has|did) not (been )?(broken?|dead|fail(ed)?|stuck|damaged|down|out|lost)\b"
@@ -308,6 +329,10 @@ def _is_denied(line: str, intent: str) -> bool:
         intent == "robot_failed" and _SOUND.search(line)
     ):
         return True
+    if intent != "cancel_task" and _PASSIVE.search(line):
+        return True
+    if intent == "obstacle_update" and _NONE_SUCH.search(line):
+        return True
     rest = _NOT_AFTER_ALL.sub(" ", line)
     if intent in ("remove_obstacle", "cancel_task", "change_task_priority", "robot_failed"):
         rest = re.sub(
@@ -320,6 +345,7 @@ def _is_denied(line: str, intent: str) -> bool:
             rest,
         )
         rest = re.sub(r"\b(not|never) (bother|waste|trouble)\b", " ", rest)
+        rest = re.sub(r"\bno (need|point|use|reason|sense) (in|of|for|to|keeping|doing)\b", " ", rest)
     if intent == "obstacle_update":
         rest = re.sub(r"\b(no|not) (way|passage|access|go|entry|through\w*|there|yet)\b", " ", rest)
         if re.search(r"\bthere is no\b|\bno (<kind>|obstacle|wall|blockage)\b", rest):
@@ -362,7 +388,7 @@ def doubtful(line: str, intent: str) -> str | None:
         return "You sound unsure, so I ask before I propose anything."
     if intent != "query_status" and (_OR.search(line) or _OR_DO.search(line)):
         return "That leaves open which one is meant. Name exactly one."
-    line = _NO_OTHER.sub(" ", line)
+    line = re.sub(r"\bas well as\b", "and", _NO_OTHER.sub(" ", line))
     if intent in ("change_task_priority", "cancel_task") and _COMPARES.search(line):
         return (
             "I cannot order two tasks against each other; I can make a task high, normal or low "
@@ -453,6 +479,8 @@ _VAGUE_AFTER = re.compile(
 def is_vague(tokens: Sequence[Token], at: int) -> bool:
     """Whether the place or point at an index is only the surroundings of what is meant."""
     before = as_line(tokens[max(at - 8, 0) : at])
+    if sum(one.kind == "point" for one in tokens) > 2:  # corners
+        before = re.sub(r"\b(inside|within|between|around)( of| the)?( \w+)?\W*$", "", before)
     before = re.sub(r"[\[(, ]+$", "", before)
     if tokens[at].kind == "point":
         before = re.sub(r"\bbetween( the)?( points?| coordinates?)?$", "", before.strip())

@@ -39,6 +39,15 @@ KINDS = {
     "bollard",
     "column", "divider", "booth", "statue", "scooter", "desk", "wardrobe", "ramp", "cordon",
     "container", "cage", "pole", "pillar", "partition", "barricade", "scaffold", "scaffolding",
+    "cupboard", "freezer", "tape", "pond", "pool", "plank", "mattress", "piano", "printer",
+    "copier", "generator", "compressor", "tank", "pit", "crane", "digger", "excavator", "tractor",
+    "wagon", "caravan", "tent", "banner", "signpost", "easel", "podium",
+    "suitcase", "toolbox", "wheelbarrow", "hay", "bale", "sandbag", "sack", "keg",
+    "cask", "spool", "drape", "gurney", "bed", "couch", "armchair", "stool",
+    "bookcase", "bookshelf", "locker", "vending-machine", "kiosk", "turnstile",
+    "girder", "brick", "gravel", "mud", "ice", "snow", "motorbike",
+    "moped", "minibus", "bus", "ambulance", "hoist", "winch", "conveyor", "flowerbed", "shrub",
+    "sapling", "stump", "fountain", "sculpture", "monument", "billboard", "barrow",
 }  # fmt: skip
 """What obstacles are called anywhere, besides the kinds of the live world."""
 
@@ -262,7 +271,9 @@ def _name(
     single = part[0]
     if len(part) == 1 and not single.quoted and _everyday(single, names):
         shouted = single.raw.isupper() and len(single.raw) > 1
-        if kind == "label" and not shouted and not _is_meant(last, after, bool(told)):
+        listed = len(before) > 1 and before[-2].kind == "label" and last in ("and", ",", "&")
+        told_of = bool(told) or listed or (not before and single.text not in _PRONOUNS)
+        if kind == "label" and not shouted and not _is_meant(last, after, told_of):
             return None
         if kind == "place" and last not in _BEFORE_PLACE | NOUNS["place"]:
             return None
@@ -283,6 +294,8 @@ def _spelled(part: Sequence[Token], letters: str, names: Names) -> Token | None:
 
 _BEFORE_PLACE = {"to", "at", "from", "in", "the", "into", "for", "near", "->", "=>", "around", "by"}
 _VERBS = {"cancel", "prioritize", "raise", "drop", "delete", "lower", "abort", "boost", "expedite"}
+_PRONOUNS = {"he", "she", "it", "we", "they", "you", "i", "there", "this", "that"}
+_AFTER_LABEL = {"is", "are", "has", "have", "goes", "comes", "needs", "must", "should", "will"}
 _AFTER_NO_LABEL = {
     "done", "first", "finished", "handled", "completed", "the", "a", "last", "next", "served",
     "executed", "picked", "urgent", "more", "taken", "moved", "delivered", "processed", "there",
@@ -292,6 +305,8 @@ _AFTER_NO_LABEL = {
 def _is_meant(before: str, after: Sequence[Token], told: bool) -> bool:
     """Whether an everyday word, as ``be`` in ``cancel be``, is the label of a task."""
     follows = after[0].text if after else ""
+    if told and before not in NOUNS["label"]:
+        return follows in _AFTER_LABEL
     return (told or before in _VERBS) and follows not in _AFTER_NO_LABEL
 
 

@@ -14,11 +14,10 @@ _LOW = re.compile(
     r"\b(low(est|er)?( |-)?priority|priority (is |of |to |at |: |= )*(low\w*|minimum)|(not"
     r"|no longer|less|least|"
     r"isn't) (so |that |very |really |too )?(urgent|important|pressing|critical)|no (rush|hurry|"
-    r"urgency|pressure)|low|(?<!not )(?<!hardly )(?<!never )can wait|at the end|lowest"
-    r"|whenever (you|there|it)|unimportant|"
-    r"take your time|nothing (urgent|pressing|important)|all the time in the world"
-    r"|plenty of time|depriorit\w+|downgrad\w+|demot\w+"
-    r"|last|when (you have|there is) (some |)time|not in a hurry)\b"
+    r"urgency|pressure)|low|(?<!not )(?<!hardly )(?<!never )can wait|at the end|lowest|whenever (you|there|it)|unimportant|"
+    r"take your time|all the time in the world|plenty of time|nothing important|depriorit\w+|downgrad\w+|demot\w+|last|no stress|at (your|their) leisure|when(ever)? (it is )?convenient|nothing urgent|in (your|their) own time"
+    r"|not pressing|back burner|bottom of the (list|queue|pile|stack)|back of the (list|queue|line)|no biggie"
+    r"|in no (hurry|rush)|leisurely|(any|some) time will do|can be late|nothing pressing|when (you have|there is) (some |)time|not in a hurry)\b"
 )
 _HIGH = re.compile(
     r"\b((?<!not )(?<!no longer )(?<!not so )(?<!not very )(?<!not that )(urgent(ly)?|asap"
@@ -26,8 +25,13 @@ _HIGH = re.compile(
     r"(high(est|er)?|top|maximum|first|max)( |-)?priority|priority (is |of |to |at |: "
     r"|= )*(high\w*|urgent|top|1|one)|"
     r"as soon as possible|immediately|right away|at once|emergency|rush|high|quickly|"
-    r"(can|could|must|should|may) not wait|with priority|straight away|without delay"
-    r"|before (all|everything|anything)( else"
+    r"(can|could|must|should|may) not wait|"
+    r"on the double|pronto|stat|chop chop|snappy|sharpish|double quick|posthaste|post-haste|utmost"
+    r"|(?<!no )(?<!not in a )(?<!any )hurry|(?<!no )(?<!not )urgency|in haste|top of the (list|queue|pile|stack)"
+    r"|front of the (list|queue|line|pile)|number one|(?<!not )time-critical|get a move on|hammer down|step on it"
+    r"|lickety-split|hot|hotfoot|tout de suite|this instant|this minute|this second|life or death|now or never"
+    r"|cannot wait|must not wait|can not wait|"
+    r"with priority|straight away|without delay|before (all|everything|anything)( else"
     r"| others?)?)\b"
 )
 _NORMAL = re.compile(

@@ -261,6 +261,8 @@ _PARTS = {
     ("1", "/", "2"): 0.5,
 }
 
+_COUNTED = {"robot", "bot", "unit", "vehicle", "machine", "agv", "amr", "cart"}
+_NUMBER = {"number", "no", "nr", "#", "num"}
 _BESIDE_NUMBER = {"x", "y", "robot", "bot", "unit", "at", "minus", "task", "="}
 
 
@@ -273,6 +275,9 @@ def _not_one(tokens: Sequence[Token], at: int) -> Token:
     before = next((one for one in reversed(tokens[:at]) if one.text not in skip), None)
     after = next((one for one in tokens[at + 1 :] if one.text not in skip), None)
     if any(one is not None and one.kind == "number" for one in (before, after)):
+        return token
+    beside = tokens[max(at - 2, 0) : at]
+    if len(beside) == 2 and beside[0].text in _COUNTED and beside[1].text in _NUMBER:
         return token
     if before is not None and before.text in _BESIDE_NUMBER:
         return token

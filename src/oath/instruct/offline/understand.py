@@ -93,6 +93,8 @@ def understand(heard: Heard) -> Reply:
     parts = commands_of(heard)
     if len(parts) == 1:
         return _one(parts[0])
+    if why := gates.conditional(heard.line):
+        return Reply(status="clarification", message=f"{why} Say it plainly if it is meant.")
     return _several(parts)
 
 
