@@ -38,7 +38,7 @@ class Offline:
         tokens = without_asides(heard.tokens, trained.words)
         if tokens and len(tokens) < len(heard.tokens):
             again = _reply(replace(heard, tokens=tokens), dialogue)
-            if again.status == "complete" or not reply.missing and again.missing:
+            if again.status == "complete" or (again.missing and not reply.missing):
                 return again
         return reply
 

@@ -13,7 +13,7 @@ _WHY = re.compile(
     r"(?:just )?(?:because(?: of)?|cos|coz|cuz|bc|so that|so (?:we|i|they|the \w+|people|he|she|nobody|"
     r"everyone|everybody|visitors|staff) (?:can|could|do|does|get|gets|will|have|has|may)\b|in order"
     r" (?:to|that)|due to|owing to|on account of|thanks to|given(?: that)?|seeing (?:that|as|how)"
-    r"|being that|as a result of|(?:since|as|for) (?:the|there|we|i|it|he|she|they|our|my|a|an|that"
+    r"|being that|as a result of|(?:since|as|for) (?:the|there|we|i|it|he|she|they|you|our|my|his|her|their|its|a|an|that|these|those"
     r"|this|somebody|someone|people|nobody|no one|everybody|everyone|another|one of)\b"
     r"(?! (?:one|last|first|same|next|above|result|robot|start|beginning|rest)\b)"
     r"|since (?:this morning|yesterday|last night|noon|today|dawn|lunch(?:time)?|breakfast))"
@@ -76,7 +76,7 @@ def without_asides(tokens: Sequence[Token], words: frozenset[str]) -> tuple[Toke
         body, why = _without_reason(piece, words)
         if why and not _is_bare(body):
             kept += body
-        elif _is_bare(piece) and (_is_manners(piece) or _is_strange(piece, words)):
+        elif _is_bare(piece) and (_is_manners(piece) or _is_strange(piece, words) or kept and _is_reason(gates.as_line(piece))):
             continue
         else:
             kept += body
@@ -110,6 +110,27 @@ def _is_strange(piece: Sequence[Token], words: frozenset[str]) -> bool:
     if not 0 < len(named) <= 5 or 2 * len(strange) < len(named):
         return False
     return _is_idle(gates.as_line(piece))
+
+
+_DECLARES = re.compile(
+    r"^\W*(there|he|she|they|we|i|it|the \w+|my \w+|our \w+|his \w+|her \w+|a \w+|an \w+|somebody|someone|people"
+    r"|everybody|everyone|visitors|customers|guests|workers|children|kids)( \w+){0,2} (is|are|am|has|have|need|needs|want"
+    r"|wants|leave|leaves|wait|waits|come|comes|came|got|gets|go|goes|can|do|does|came|went|left|took|ordered|called|asked"
+    r"|arrived|finished|starts?|closes?|opens?|likes?|hates?|sits?|stands?|looks?|hit|must|see|saw|know|hear|found)\b"
+)
+_UNSURE = re.compile(
+    r"\b(not|never|no|none|was|were|had|will|would|shall|yesterday|tomorrow|tonight|o'clock|pm|am not|says?|said|think"
+    r"|believe|guess|maybe|probably|perhaps|might|again|too|also|undo|cancel\w*|monday|tuesday|wednesday|thursday"
+    r"|friday|saturday|sunday|week|month|year|hours?|minutes?|then|when|while|or|and|joke|about it|fine|okay|wrong"
+    r"|back|over|gone|removed|cleared|fixed|planned|going to (be|build|put|have)|supposed|low|normal|special|old)\b"
+)
+
+
+def _is_reason(line: str) -> bool:
+    """Whether a piece only says how things are, and nothing that bears on what is to be done."""
+    if not _DECLARES.search(line) or said_priority(line):
+        return False
+    return not (_WEIGHS.search(line) or _UNSURE.search(line))
 
 
 def _is_idle(line: str) -> bool:

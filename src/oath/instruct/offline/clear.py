@@ -54,7 +54,7 @@ _SAYS: Mapping[str, str] = {
     "undo": (
         r"und[oi]\w*|revers\w*|revert\w*|roll\w*( \w+){0,3} back|rollback|unmake|rewind\w*"
         r"|restor\w*|ctrl.*|(take|taking|put|set|go|turn|switch|chang\w*|step|back)( \w+){0,6} back"
-        r"|back out|as (it|they|things) (was|were)|way (it|they|things) (was|were)|previous state"
+        r"|back out|as (it|they|things) (was|were)|(way|how|like) (it|they|things) (was|were)|previous state"
         r"|last (change|command|instruction|action|edit|order|step)"
     ),
     "remove_obstacle": (
@@ -164,7 +164,7 @@ _NOT_THIS = re.compile(r"\b(not|never) <(label|robot|obstacle|point|place)>")
 _TELLS_OF = re.compile(
     r"^\W*(the|this|that|our|my|a|an) (\w+ )?<kind> (from|between|at|along)\b.*<point>.*?"
     r"\b(was|were|could|might|may|should|would|needs?|has been (painted|checked|repaired|inspected))"
-    r"\b|(?<!<kind> )(?<!it )(?<!obstacle )(?<!that )(?<!which )(?<!thing )(?<!line )(?<!and )\b(drove|walked|went|drives|drive|goes|moved|ran) (along|past|by|around|over|from|through)\b"
+    r"\b|(?<!<kind> )(?<!it )(?<!obstacle )(?<!that )(?<!which )(?<!thing )(?<!line )(?<!and )(?<!not )(?<!cannot )(?<!nobody )(?<!can )\b(drove|walked|went|drives|drive|goes|moved|ran) (along|past|by|around|over|from|through)\b"
 )
 
 _META = re.compile(
@@ -305,7 +305,7 @@ _OF_MISSION = re.compile(
     r"|orders?|deliver\w*|far|things|going(?! to)|doing|done|left|remain\w*|report\w*|updates?"
     r"|summary|overview|state|situation|sitrep|finish\w*|busy|eta|scoop|rundown|plan|schedule"
     r"|happen\w*|news|mission|fleet|everyone|everybody|everything|we|obstacles?|blocked|idle|open"
-    r"|pending|waiting|queue|complete\w*|paused|brief\w*|recap|walls?|units?|bots?|stopped|shape"
+    r"|outstanding|pending|waiting|queue|complete\w*|paused|brief\w*|recap|walls?|units?|bots?|stopped|shape"
     r"|latest|coming along|it go|up to|board|working)\b"
 )
 _MEANING = re.compile(
@@ -358,6 +358,9 @@ def unclear(line: str, intent: str) -> str | None:
         _WRITE_OFF.sub(" ", _PASSABLE.sub(" ", line))
     ):
         return "That is not so yet, so I change nothing."
+    wanted = re.compile(r"\b(nobody|no one|none)( \w+)? (wants|needs|ordered|asked for|uses) <label>")
+    if intent == "cancel_task" and wanted.search(line):
+        line = wanted.sub(" no longer needed <label> ", line)
     if _NOBODY.search(line) or _GERUND.search(line):
         return "You say what not to do, or what it would be like, so I change nothing."
     if len(re.findall(r"<(label|robot|obstacle|point|place)>", line)) > 1 and _NOT_THIS.search(

@@ -51,7 +51,9 @@ def follow_up(heard: Heard, draft: Draft) -> Reply:
     filled = Filled(parameters=dict(draft.parameters))
     if not _fill(heard, draft, filled):
         reply = understand(heard)
-        if reply.intent is None or (reply.intent == draft.intent and not reply.parameters):
+        empty = not (reply.parameters or reply.commands)
+        same = reply.intent == draft.intent or len(heard.tokens) <= 4
+        if reply.intent is None or (same and empty):
             return _again(heard, draft)
         return reply
     if _AXIS.search(heard.line):

@@ -118,6 +118,7 @@ _IF_POLITE = re.compile(
     r"|hassle|problem|many|far|late|imposition|inconvenien\w*|burden)( to ask| of (you|a bother)| trouble)?\b"
     r"|\bif (it|that) (pleases|suits|does not bother|is all the same to)( you)?\b"
     r"|\bif (i|we) (might|could|can|dare|must)( (be so bold|ask|trouble you|bother you))?\b"
+    r"|\bif (any|some)(one|body) (is|could|can|has|wants|happens|fancies|would|passes)\b"
     r"|\bif you (two|lot|guys|all|folks)? ?(have|find|get|got|would be so|could be so)\b"
     r"|\bif (i may|you please|you would|you will|you do not mind|that suits you)\b"
     r"|\b(appreciate|grateful|great|nice|good|glad|happy|lovely|helpful|thankful|wonderful|better"
@@ -289,7 +290,11 @@ def not_meant(line: str, intent: str) -> str | None:
         if _is_denied(line, intent):
             return "You say what not to do, so I change nothing."
         if intent == "pause_robot":
-            line = re.sub(r"\b(un)?till? (i|we|you) \w+( so| otherwise)?[ .!]*$", " ", line)
+            line = re.sub(
+                r"\b((un)?till?|while|so long as) (i|we|you|they|people|the \w+|somebody|someone)( \w+){1,3}[ .!?]*$",
+                " ",
+                line,
+            )
         if why := conditional(line):
             return why
         if _TOLD.search(_TOLD_BY_ME.sub(" ", line)):
@@ -302,6 +307,8 @@ def not_meant(line: str, intent: str) -> str | None:
 
 
 _UNWANTED = re.compile(
+    r"\bnot (let|allow) (any\w+|them|him|her|people|somebody|someone) (tell|fool|convince|say|persuade|talk)\b"
+    r"|\bnot (believe|listen|trust|fall for)\b|"
     r"\bno (need|reason|point|use|sense|cause) (to|in|of|for) (\w+ )?(cancel|delet|remov|drop|abort"
     r"|scrap|paus|stop|resum|rais|lower|undo|halt|hold|skip|add|chang)\w*|\bnot (want|need"
     r"|ask) (<\w+>|you|me|us|him|anyone|the \w+) to\b"
@@ -485,7 +492,9 @@ def is_vague(tokens: Sequence[Token], at: int) -> bool:
     if tokens[at].kind == "point":
         before = re.sub(r"\bbetween( the)?( points?| coordinates?)?$", "", before.strip())
         before = re.sub(
-            r"\b(\w+ed by|(go|get|gets|getting|pass) past( from)?|past from)$", "", before
+            r"\b(\w+ed by|(go|get|gets|getting|pass|passes|come|comes|squeeze) past( from)?|past from)$",
+            "",
+            before.strip(),
         )
         before = re.sub(r"\b(side|corner|end|entrance|middle|edge|door)s? at$", "", before)
     return bool(

@@ -17,6 +17,7 @@ _LOW = re.compile(
     r"urgency|pressure)|low|(?<!not )(?<!hardly )(?<!never )can wait|at the end|lowest|whenever (you|there|it)|unimportant|"
     r"take your time|all the time in the world|plenty of time|nothing important|depriorit\w+|downgrad\w+|demot\w+|last|no stress|at (your|their) leisure|when(ever)? (it is )?convenient|nothing urgent|in (your|their) own time"
     r"|not pressing|back burner|bottom of the (list|queue|pile|stack)|back of the (list|queue|line)|no biggie"
+    r"|(drop|lower|reduce|decrease|cut)( the| its)? priority"
     r"|in no (hurry|rush)|leisurely|(any|some) time will do|can be late|nothing pressing|when (you have|there is) (some |)time|not in a hurry)\b"
 )
 _HIGH = re.compile(
@@ -26,7 +27,8 @@ _HIGH = re.compile(
     r"|= )*(high\w*|urgent|top|1|one)|"
     r"as soon as possible|immediately|right away|at once|emergency|rush|high|quickly|"
     r"(can|could|must|should|may) not wait|"
-    r"on the double|pronto|stat|chop chop|snappy|sharpish|double quick|posthaste|post-haste|utmost"
+    r"(raise|increase|boost|bump up|up)( the| its)? priority|on the double|trumps everything|beats everything|"
+    r"pronto|stat|chop chop|snappy|sharpish|double quick|posthaste|post-haste|utmost"
     r"|(?<!no )(?<!not in a )(?<!any )hurry|(?<!no )(?<!not )urgency|in haste|top of the (list|queue|pile|stack)"
     r"|front of the (list|queue|line|pile)|number one|(?<!not )time-critical|get a move on|hammer down|step on it"
     r"|lickety-split|hot|hotfoot|tout de suite|this instant|this minute|this second|life or death|now or never"
