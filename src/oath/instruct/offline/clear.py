@@ -22,11 +22,16 @@ _SAYS: Mapping[str, str] = {
         r"|schedule)|moot|out of the (plan|list|queue|schedule)|shelv\w*|stand down|chuck|toss"
         r"|eliminat\w*|disregard|ignor\w*|rescind\w*|decided against|short-ship|belay|wave off"
         r"|(is|are) off|without|after all|lose|gone|dead|wipe\w*"
-        r"|thr[eo]w\w* (\w+ |<\w+> ){0,3}(out|away)|eighty-six|eighty - six|86|decided against|against|binn\w+|binned"
-        r"|chop\w*|give up on|let <label> go|<label> (can|may|must|should|has to|is to) go|scupper\w*|quash\w*"
-        r"|<label> (is|was) a (mistake|typo|duplicate|error)|wash\w* out|out with|do away|see the back of"
-        r"|repeal\w*|invalid\w*|negate\w*|fell through|fallen through|by mistake|in error|duplicate|trash\w*|junk\w*"
-        r"|back(ed|ing)? out|reject\w*|refus\w*|decline\w*|suspended|closed|unlist\w*|kibosh|finish\w* with"
+        r"|thr[eo]w\w* (\w+ |<\w+> ){0,3}(out|away)|eighty-six|eighty - six|86"
+        r"|decided against|against|binn\w+|binned"
+        r"|chop\w*|give up on|let <label> go|<label> (can|may|must|should|has to|is to) go"
+        r"|scupper\w*|quash\w*"
+        r"|<label> (is|was) a (mistake|typo|duplicate|error)|wash\w* out|out with|do away"
+        r"|see the back of"
+        r"|repeal\w*|invalid\w*|negate\w*|fell through|fallen through|by mistake|in error"
+        r"|duplicate|trash\w*|junk\w*"
+        r"|back(ed|ing)? out|reject\w*|refus\w*|decline\w*|suspended|closed|unlist\w*|kibosh"
+        r"|finish\w* with"
     ),
     "robot_failed": (
         r"fail\w*|brok\w*|break\w* down|breakdown|dead|di(ed|es)|defect\w*|kaput\w*|crash\w*"
@@ -43,18 +48,26 @@ _SAYS: Mapping[str, str] = {
         r"|gone) down(?! (the|at|by|to))|down(?! (the|at|by|to))"
         r"|(is|are|s) out|offline|off-line|gone|collaps\w*|defunct|unresponsive|stuck|wrong with"
         r"|shot|fried|jammed|written|lifeless|(lost|no|out of) (power|battery|wheel)"
-        r"|aog|beyond (repair|help|saving|rescue)|drown\w*|bl[eo]w\w*|blown|snapp\w*|sank|sunk|melt\w*|explod\w*"
-        r"|seiz\w*|crack\w*|(packed|pack) (\w+ )?(in|up)|bit(ten)? the dust|kicked the bucket|had it|had its day"
-        r"|no good|on fire|smash\w*|shatter\w*|torn|flipp\w*|tipp\w*|roll\w* over|retire\w*|scrap\w*|ghost|knackered"
-        r"|f[ao]ll(en)? (off|apart|down|into|to)|fell|short ?-?circuit\w*|dropped dead|in pieces|to pieces|wrecked"
-        r"|rip|r\.i\.p|pass(ed)? away|expired|perished|snuffed|croaked|borked|busted|hosed|bust|write-off|demolished"
-        r"|destroyed|crushed|run over|hit by|remov\w* .*service|take .*(service|roster|lineup|line-up)|mia|missing"
-        r"|non-?operational|non-?functional|disintegrat\w*|immobile|catch\w* fire|caught fire|flames|catastroph\w*"
+        r"|aog|beyond (repair|help|saving|rescue)|drown\w*|bl[eo]w\w*|blown|snapp\w*|sank"
+        r"|sunk|melt\w*|explod\w*"
+        r"|seiz\w*|crack\w*|(packed|pack) (\w+ )?(in|up)|bit(ten)? the dust|kicked the bucket"
+        r"|had it|had its day"
+        r"|no good|on fire|smash\w*|shatter\w*|torn|flipp\w*|tipp\w*|roll\w* over|retire\w*"
+        r"|scrap\w*|ghost|knackered"
+        r"|f[ao]ll(en)? (off|apart|down|into|to)|fell|short ?-?circuit\w*|dropped dead"
+        r"|in pieces|to pieces|wrecked"
+        r"|rip|r\.i\.p|pass(ed)? away|expired|perished|snuffed|croaked|borked|busted|hosed"
+        r"|bust|write-off|demolished"
+        r"|destroyed|crushed|run over|hit by|remov\w* .*service|take .*(service|roster|lineup"
+        r"|line-up)|mia|missing"
+        r"|non-?operational|non-?functional|disintegrat\w*|immobile|catch\w* fire|caught fire"
+        r"|flames|catastroph\w*"
     ),
     "undo": (
         r"und[oi]\w*|revers\w*|revert\w*|roll\w*( \w+){0,3} back|rollback|unmake|rewind\w*"
         r"|restor\w*|ctrl.*|(take|taking|put|set|go|turn|switch|chang\w*|step|back)( \w+){0,6} back"
-        r"|back out|as (it|they|things) (was|were)|(way|how|like) (it|they|things) (was|were)|previous state"
+        r"|back out|as (it|they|things) (was|were)|(way|how|like) (it|they|things) (was|were)"
+        r"|previous state"
         r"|last (change|command|instruction|action|edit|order|step)"
     ),
     "remove_obstacle": (
@@ -65,8 +78,10 @@ _SAYS: Mapping[str, str] = {
         r"|elsewhere|to the side)|rm|strike|scratch|cancel\w*|passable"
         r"|pass|picked up|forget|carried|collected|out of the way|outta|out there|disregard"
         r"|undone|left|fixed|down|off the|mopped|swept|towed|scrap|history|ignore"
-        r"|shift\w*|c(a|o)me down|haul\w*|dragg\w*|roll\w*|cart\w* off|melt\w*|dried|drop|evaporat\w*|stow\w*|repair\w*"
-        r"|knock\w* down|push\w* (aside|away)|got rid|scrub\w*|sort\w*|unlock\w*|reopen\w*|moved on|relocat\w*|disassembl\w*"
+        r"|shift\w*|c(a|o)me down|haul\w*|dragg\w*|roll\w*|cart\w* off|melt\w*|dried|drop"
+        r"|evaporat\w*|stow\w*|repair\w*"
+        r"|knock\w* down|push\w* (aside|away)|got rid|scrub\w*|sort\w*|unlock\w*|reopen\w*"
+        r"|moved on|relocat\w*|disassembl\w*"
     ),
     "obstacle_update": (
         r"block\w*|clos\w*|impass\w*|obstruct\w*|shut|cut off|cordon\w*|passable|off ?-?limits"
@@ -87,24 +102,32 @@ _SAYS: Mapping[str, str] = {
         r"|come up|pop\w*|note|ends?|finish\w*|across|starts?|begin\w*|consider"
         r"|treat|declare|place|record|went up|sprung|emerged|turned up|hang\w*|lean\w*"
         r"|protrud\w*|dangl\w*|planted|tak\w+ up|fill\w*|gr[eo]w\w*|locate\w*|crosses|runs"
-        r"|roadblock|tape\w*|dug|dig\w*|occupies|existence|account|kept|footprint|bar\w*|stretches|sit(s|ting)|rest\w*"
-        r"|snow\w*|flood\w*|leak\w*|parked|stack\w*|pile\w*|heap\w*|stor\w*|hazard\w*|danger\w*|work in progress|locked"
-        r"|constru\w*|mounted|hung|hang\w*|abandon\w*|forgot\w*|swing|swung|crash\w*|separat\w*|divid\w*|fenc\w*|wall\w*"
-        r"|taken up|filled|rerout\w*|detour\w*|go around|stay (out|away|clear)|exists?|goes from|extend\w*|arriv\w*|deliver\w*"
+        r"|roadblock|tape\w*|dug|dig\w*|occupies|existence|account|kept|footprint|bar\w*"
+        r"|stretches|sit(s|ting)|rest\w*"
+        r"|snow\w*|flood\w*|leak\w*|parked|stack\w*|pile\w*|heap\w*|stor\w*|hazard\w*"
+        r"|danger\w*|work in progress|locked"
+        r"|constru\w*|mounted|hung|hang\w*|abandon\w*|forgot\w*|swing|swung|crash\w*"
+        r"|separat\w*|divid\w*|fenc\w*|wall\w*"
+        r"|taken up|filled|rerout\w*|detour\w*|go around|stay (out|away|clear)|exists?"
+        r"|goes from|extend\w*|arriv\w*|deliver\w*"
     ),
     "pause_robot": (
         r"stop\w*|paus\w*|hold\w*|halt\w*|freez\w*|frozen|wait\w*|park\w*|stay\w*|stand\w*|still"
         r"|suspend\w*|brak\w*|whoa|not (let )?(\w+ |<robot> )?(mov\w*|go|driv\w*|budge|continue"
         r"|proceed|leave|do anything)|hang|rest|immobili\w*|stall\w*|keep|remain\w*|ceas\w*|tight"
-        r"|break|pull over|pin|put|a moment|a second|a minute|stationary|e-stop|pull|quit|hang fire|hold fire|stand by|standby|easy|anchor\w*|idle|knock it off|enough"
-        r"|put (\w+ |<\w+> ){0,2}on hold|kill|cut|lock|down tools|time out|timeout|breather|rein|slam|hands off|as you are|stick"
+        r"|break|pull over|pin|put|a moment|a second|a minute|stationary|e-stop|pull|quit"
+        r"|hang fire|hold fire|stand by|standby|easy|anchor\w*|idle|knock it off|enough"
+        r"|put (\w+ |<\w+> ){0,2}on hold|kill|cut|lock|down tools|time out|timeout|breather"
+        r"|rein|slam|hands off|as you are|stick"
     ),
     "resume_robot": (
         r"resum\w*|restart\w*|continu\w*|unpaus\w*|releas\w*|unfreez\w*|unhold|wak\w*|reactivat\w*"
         r"|start\w*|un-\w+|unblock\w*|unpark\w*|let|go\w*|proceed\w*|carry|free\w*|mov\w*|driv\w*"
         r"|roll\w*|again|back|green|work\w*|on|off|up|may|can|clear\w*|unlock\w*|set|activ\w*"
-        r"|crack on|back|get (\w+ |<\w+> ){0,3}(moving|going|rolling|started|cracking|on)|hit the road|run\w*|kick|ahead|about"
-        r"|fire up|chop|hop|march|march on|press on|push on|keep going|as before|on (your|its|his|her|their) way|dismissed|return\w*"
+        r"|crack on|back|get (\w+ |<\w+> ){0,3}(moving|going|rolling|started|cracking|on)"
+        r"|hit the road|run\w*|kick|ahead|about"
+        r"|fire up|chop|hop|march|march on|press on|push on|keep going|as before|on (your|its"
+        r"|his|her|their) way|dismissed|return\w*"
     ),
 }
 _EVIDENCE = {
@@ -163,8 +186,11 @@ _REPORTS = re.compile(
 _NOT_THIS = re.compile(r"\b(not|never) <(label|robot|obstacle|point|place)>")
 _TELLS_OF = re.compile(
     r"^\W*(the|this|that|our|my|a|an) (\w+ )?<kind> (from|between|at|along)\b.*<point>.*?"
-    r"\b(was|were|could|might|may|should|would|needs?|has been (painted|checked|repaired|inspected))"
-    r"\b|(?<!<kind> )(?<!it )(?<!obstacle )(?<!that )(?<!which )(?<!thing )(?<!line )(?<!and )(?<!not )(?<!cannot )(?<!nobody )(?<!can )\b(drove|walked|went|drives|drive|goes|moved|ran) (along|past|by|around|over|from|through)\b"
+    r"\b(was|were|could|might|may|should|would|needs?|has been (painted|checked|repaired"
+    r"|inspected))"
+    r"\b|(?<!<kind> )(?<!it )(?<!obstacle )(?<!that )(?<!which )(?<!thing )(?<!line )(?<!and"
+    r" )(?<!not )(?<!cannot )(?<!nobody )(?<!can )\b(drove|walked|went|drives|drive|goes"
+    r"|moved|ran) (along|past|by|around|over|from|through)\b"
 )
 
 _META = re.compile(
@@ -183,13 +209,18 @@ _SAID = re.compile(
     r"|predict\w*|fears?|feared|doubts?|denie[sd]|deny|swears?|swore|thought|knew|dream\w*)\b"
 )
 _PLANNED = re.compile(
-    r"(?<!would )(?<!should )(?<!'d )\b(likes?|loves?|prefers?|enjoys?|hates?|refuses?) (to|\w+ing)\b|\bkee?p(s|t) "
-    r"(on )?\w+ing\b|\b(is|are|am|was|were|be) (also |just |now |all )?(going|about|planning|meant|hoping"
-    r"|intending|supposed|due|scheduled|expected|bound|likely|set(?! to (high|low|normal|top|urgent|the|maximum|minimum|<\w+>))|tempted|inclined) to "
+    r"(?<!would )(?<!should )(?<!'d )\b(likes?|loves?|prefers?|enjoys?|hates?|refuses?) (to"
+    r"|\w+ing)\b|\bkee?p(s|t) "
+    r"(on )?\w+ing\b|\b(is|are|am|was|were|be) (also |just |now |all )?(going|about|planning"
+    r"|meant|hoping"
+    r"|intending|supposed|due|scheduled|expected|bound|likely|set(?! to (high|low|normal|top"
+    r"|urgent|the|maximum|minimum|<\w+>))|tempted|inclined) to "
     r"(?!be (brought|taken|carried|delivered|moved|picked|fetched|collected)\b)(?!need\b)"
     r"(?!the\b)(?!move\b)[a-z]+\b"
-    r"|(?<!not )(?<!n't )\b(plan|plans|planned|intend\w*|mean|meant|hope|hoped|aim|wanted|tried|try|tend|used)"
-    r" (for \w+ )?to\b|\bought to\b(?! (really )?(be (done|first|served|handled|next|finished)|come|go|jump) )|\b(some|one|any) day\b|\beventually\b|\bin (the )?future\b"
+    r"|(?<!not )(?<!n't )\b(plan|plans|planned|intend\w*|mean|meant|hope|hoped|aim|wanted"
+    r"|tried|try|tend|used)"
+    r" (for \w+ )?to\b|\bought to\b(?! (really )?(be (done|first|served|handled|next"
+    r"|finished)|come|go|jump) )|\b(some|one|any) day\b|\beventually\b|\bin (the )?future\b"
     r"|\bnext (week|month|year|time|monday|tuesday|wednesday|thursday|friday|shift)\b"
     r"|\b(i|we) (would|could|might) (?!like|love|prefer|appreciate|be (grateful|glad|happy|obliged"
     r"|delighted)|need|want|rather|ask|please|also|really|not|use|have|just)\b"
@@ -211,7 +242,8 @@ _PASSABLE = re.compile(
     r"|entered|treated|considered|able|closed off|removed|deleted|taken|cleared|erased|wiped))\b"
 )
 _WRITE_OFF = re.compile(
-    r"\b(we|you|they|i) (will |would |shall )?(have to|must|need to|should|can|had to|has to|ought to) "
+    r"\b(we|you|they|i) (will |would |shall )?(have to|must|need to|should|can|had to|has to"
+    r"|ought to) "
     r"(write|count|scrap|replace|mark|declare|take|retire|bury|do without|manage without|forget)\b"
 )
 _OFTEN = re.compile(
@@ -284,7 +316,10 @@ _CAME = re.compile(
     r"(?! (in|up|at|now)\b)"
 )
 
-_SWITCHED = re.compile(r"\b(shut|switch|turn|power|wind|stand|slow|calm|settle|sit)(ing|ting)? (<\w+> )?(down|off)\b")
+_SWITCHED = re.compile(
+    r"\b(shut|switch|turn|power|wind|stand|slow|calm|settle|sit)(ing|ting)? (<\w+> )?(down"
+    r"|off)\b"
+)
 _GONE_OFF = re.compile(
     r"\b(dead|died|dies|broke\w*|fail(ed)?(?! (to|its|his|her|the|at|on|<\w+>)\b)|crash\w*"
     r"|burn\w*|wreck\w*|out of (order|service"
@@ -305,7 +340,8 @@ _OF_MISSION = re.compile(
     r"|orders?|deliver\w*|far|things|going(?! to)|doing|done|left|remain\w*|report\w*|updates?"
     r"|summary|overview|state|situation|sitrep|finish\w*|busy|eta|scoop|rundown|plan|schedule"
     r"|happen\w*|news|mission|fleet|everyone|everybody|everything|we|obstacles?|blocked|idle|open"
-    r"|outstanding|pending|waiting|queue|complete\w*|paused|brief\w*|recap|walls?|units?|bots?|stopped|shape"
+    r"|outstanding|pending|waiting|queue|complete\w*|paused|brief\w*|recap|walls?|units?"
+    r"|bots?|stopped|shape"
     r"|latest|coming along|it go|up to|board|working)\b"
 )
 _MEANING = re.compile(
@@ -326,6 +362,18 @@ _TERSE = re.compile(
     r"(?:over|please|thanks|obstacle|out|copy)?\W*"
 )
 """Says no more than what and where."""
+
+
+_FIRST = re.compile(
+    r"\b(first|last|next|before|after|priority|urgen\w*|later|sooner|front|back|top|bottom"
+    r"|normal)\b"
+)
+
+
+def means(line: str, intent: str) -> bool:
+    """Whether words say by themselves that an intent is meant."""
+    found = _EVIDENCE.get(intent, _FIRST).search(line)
+    return bool(found)
 
 
 def is_evidence(line: str) -> bool:
@@ -358,7 +406,9 @@ def unclear(line: str, intent: str) -> str | None:
         _WRITE_OFF.sub(" ", _PASSABLE.sub(" ", line))
     ):
         return "That is not so yet, so I change nothing."
-    wanted = re.compile(r"\b(nobody|no one|none)( \w+)? (wants|needs|ordered|asked for|uses) <label>")
+    wanted = re.compile(
+        r"\b(nobody|no one|none)( \w+)? (wants|needs|ordered|asked for|uses) <label>"
+    )
     if intent == "cancel_task" and wanted.search(line):
         line = wanted.sub(" no longer needed <label> ", line)
     if _NOBODY.search(line) or _GERUND.search(line):
@@ -403,7 +453,9 @@ def _of_one(line: str, intent: str) -> str | None:
             return "I undo the last change only. Say 'undo the last change' if that is meant."
         case "undo" if re.search(r"\b(status|update|progress|report|news)\b", line):
             return "Do you want to know the status?"
-        case "undo" if _ALL.search(re.sub(r"\bmost (recent|recently)\b", "last", line)) or re.search(r"\b(since|first|from|last \w+s)\b", line):
+        case "undo" if _ALL.search(
+            re.sub(r"\bmost (recent|recently)\b", "last", line)
+        ) or re.search(r"\b(since|first|from|last \w+s)\b", line):
             return "I undo the last change only. Say 'undo the last change' if that is meant."
         case "cancel_task" if re.search(r"\b(everything|anything|others?|rest)\b", line):
             return "I cancel tasks by their labels only."

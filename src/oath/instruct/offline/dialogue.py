@@ -14,8 +14,8 @@ from oath.instruct.offline import gates, new_task, questions, slots
 from oath.instruct.offline.gates import as_line
 from oath.instruct.offline.heard import Filled, Heard
 from oath.instruct.offline.tokens import Token
-from oath.model import Point
 from oath.instruct.offline.understand import NEEDS, answer, meaning, understand
+from oath.model import Point
 
 _DROP = re.compile(
     r"^(?:\W*(?:no|oh|ok|okay|well|ah|sorry|actually|please|just) )*\W*(?:never ?mind"
@@ -25,7 +25,8 @@ _DROP = re.compile(
     r"no thanks?|no thank you|nothing|not needed|let it be|do not bother|i changed my mind"
     r"|discard (?:it|that)"
     r"|no|nope|cancel|dismiss|ignore (?:it|that))(?: (?:please|then|anymore|again|now|after all"
-    r"|thanks|it is (still )?(there|needed|here)( after all)?|i was (wrong|mistaken)|my mistake|leave it( as it (is|was))?|leave (things|everything)"
+    r"|thanks|it is (still )?(there|needed|here)( after all)?|i was (wrong|mistaken)"
+    r"|my mistake|leave it( as it (is|was))?|leave (things|everything)"
     r" as (they|it) (are|is)|it is (fine|ok|okay|good)( as it is)?|sorry|,|\.|!))*\W*$"
 )
 
@@ -36,6 +37,7 @@ _CORRECTS = re.compile(
 )
 
 
+_NOT_SO = re.compile(r"\b(not|instead of|rather than) (a )?(high|low|normal|urgent)( priority)?\b")
 _ORDINALS = re.compile(r"\b(first|second|third|last) (point|end|corner|one|coordinate)\b")
 
 
@@ -98,7 +100,8 @@ def _again(heard: Heard, draft: Draft) -> Reply:
 
 
 _ANSWERS = re.compile(
-    r"(?:\W|(?:it|that|this|the|is|are|one|task|job|robot|number|no|nr|label|id|called|named|please|thanks"
+    r"(?:\W|(?:it|that|this|the|is|are|one|task|job|robot|number|no|nr|label|id|called|named"
+    r"|please|thanks"
     r"|thank|you|with|for|i|mean|meant|want|take|make|of|course|would|be|called|my|mistake|sorry|ok"
     r"|okay|yes|um|uh|er|well|oh|a|an|kind|type|point|room|place|obstacle|at|in|to|from|and"
     r"|between|should|could|must|go|goes|over|there|then|at|has|have|runs|reaches|until|till|up"
@@ -220,7 +223,7 @@ def _fill_task(heard: Heard, draft: Draft, filled: Filled) -> None:
     new_task.read_new_label(heard, extra)
     new_task.read_type(heard, extra)
     filled.trouble = extra.trouble
-    said = new_task.said_priority(heard.line)
+    said = new_task.said_priority(_NOT_SO.sub(" ", heard.line))
     if len(said) == 1:
         extra.parameters["priority"] = said.pop()
     filled.parameters |= extra.parameters
@@ -250,7 +253,8 @@ def _fill_task(heard: Heard, draft: Draft, filled: Filled) -> None:
 
 
 _AXIS = re.compile(
-    r"\b(x|y)(?: coordinate| value)?(?: (?:is|should|be|must|to|of|=|:|equals|must|needs|actually|has))* "
+    r"\b(x|y)(?: coordinate| value)?(?: (?:is|should|be|must|to|of|=|:|equals|must|needs"
+    r"|actually|has))* "
     r"<number>[ .!]*$"
 )
 
@@ -318,14 +322,16 @@ def _fill_obstacle(heard: Heard, filled: Filled) -> None:
 
 def _end(line: str) -> int | None:
     """Which end of a line one point is said to be; None if that is not clear."""
-    to = re.search(r"\b(to|until|till|ends?|end point|second|finish\w*|stops?|up to)\b.*<point>", line)
+    to = re.search(
+        r"\b(to|until|till|ends?|end point|second|finish\w*|stops?|up to)\b.*<point>", line
+    )
     start = re.search(r"\b(from|starts?|begins?|beginning|start point|first)\b.*<point>", line)
     return None if bool(to) == bool(start) else int(bool(to))
 
 
 def _fill_label(heard: Heard, draft: Draft, filled: Filled) -> None:
     if draft.intent == "change_task_priority":
-        said = new_task.said_priority(heard.line)
+        said = new_task.said_priority(_NOT_SO.sub(" ", heard.line))
         said |= {one.text for one in heard.tokens if one.text in ("low", "normal", "high")}
         if len(said) == 1:
             filled.parameters["priority"] = said.pop()

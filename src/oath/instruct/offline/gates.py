@@ -6,7 +6,7 @@ Every gate reads an instruction as one line of words and tags, e.g. ``do not can
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 
 from oath.instruct.offline.tokens import Token
 
@@ -114,8 +114,10 @@ _IF_POLITE = re.compile(
     r" not mind|need be|a (chance|moment|minute|second))\b"
     r"|\bif (it|that|this) (is|would be|be) (ok|okay|all right|alright|fine|possible|convenient"
     r"|no (trouble|bother|problem)|not too (much|late)[a-z ]*|good|acceptable|allowed)\b"
-    r"|\bif (it|that|this) (is|would)( be)? not (too|asking|a|an|any) (\w+ ){0,3}(much|trouble|bother"
-    r"|hassle|problem|many|far|late|imposition|inconvenien\w*|burden)( to ask| of (you|a bother)| trouble)?\b"
+    r"|\bif (it|that|this) (is|would)( be)? not (too|asking|a|an|any) (\w+ ){0,3}(much"
+    r"|trouble|bother"
+    r"|hassle|problem|many|far|late|imposition|inconvenien\w*|burden)( to ask| of (you"
+    r"|a bother)| trouble)?\b"
     r"|\bif (it|that) (pleases|suits|does not bother|is all the same to)( you)?\b"
     r"|\bif (i|we) (might|could|can|dare|must)( (be so bold|ask|trouble you|bother you))?\b"
     r"|\bif (any|some)(one|body) (is|could|can|has|wants|happens|fancies|would|passes)\b"
@@ -134,7 +136,9 @@ _IF_POLITE = re.compile(
 _TOLD = re.compile(
     r"\b(said|told|(?:i|we) (?:have |just )?read(?: that)?|claims?|claimed|mentioned|heard"
     r"|according to|allegedly|rumou?rs?|thinks|believes"
-    r"|supposedly|wrote|states|announced|(?<!boss )(?<!director )(?<!manager )(?<!client )(?<!customer )(?<!chef )(?<!doctor )insists?|suspects?|quote|hearsay|reckons|texted|emailed"
+    r"|supposedly|wrote|states|announced"
+    r"|(?<!boss )(?<!director )(?<!manager )(?<!client )(?<!customer )(?<!chef )(?<!doctor"
+    r" )insists?|suspects?|quote|hearsay|reckons|texted|emailed"
     r"|reportedly|wants (me|us|you)|asked (me|us|you|to|if|whether))\b"
     r"|\b(?!it\b)\w+ says\b|\b(\w+) (?<!\bbe )(?<!\bto )(reports|reported) (that|there|a|an"
     r"|seeing)\b"
@@ -212,7 +216,8 @@ _LIMITS = re.compile(
 )
 _NO_LIMIT = re.compile(
     r"\b(for|hold on|wait|stop|pause) (a|one|some|few|a few) (minutes?|seconds?|moment|hours?)\b"
-    r"|\b(a|one|this|spare|free|any|half a|your) (spare |free |quick )?(minute|second|moment|sec|min|hour)\b|\bmost (?:urgent|important)\b"
+    r"|\b(a|one|this|spare|free|any|half a|your) (spare |free |quick )?(minute|second|moment"
+    r"|sec|min|hour)\b|\bmost (?:urgent|important)\b"
     r"|\bat all times\b|\b(checked|looked|tried|asked|called|tested) (\w+ )?(twice|\w+ times)\b"
 )
 
@@ -291,7 +296,8 @@ def not_meant(line: str, intent: str) -> str | None:
             return "You say what not to do, so I change nothing."
         if intent == "pause_robot":
             line = re.sub(
-                r"\b((un)?till?|while|so long as) (i|we|you|they|people|the \w+|somebody|someone)( \w+){1,3}[ .!?]*$",
+                r"\b((un)?till?|while|so long as) (i|we|you|they|people|the \w+|somebody"
+                r"|someone)( \w+){1,3}[ .!?]*$",
                 " ",
                 line,
             )
@@ -307,20 +313,25 @@ def not_meant(line: str, intent: str) -> str | None:
 
 
 _UNWANTED = re.compile(
-    r"\bnot (let|allow) (any\w+|them|him|her|people|somebody|someone) (tell|fool|convince|say|persuade|talk)\b"
+    r"\bnot (let|allow) (any\w+|them|him|her|people|somebody|someone) (tell|fool|convince|say"
+    r"|persuade|talk)\b"
     r"|\bnot (believe|listen|trust|fall for)\b|"
     r"\bno (need|reason|point|use|sense|cause) (to|in|of|for) (\w+ )?(cancel|delet|remov|drop|abort"
     r"|scrap|paus|stop|resum|rais|lower|undo|halt|hold|skip|add|chang)\w*|\bnot (want|need"
     r"|ask) (<\w+>|you|me|us|him|anyone|the \w+) to\b"
 )
 _PASSIVE = re.compile(
-    r"\b(should|must|need|needs|ought|may|can|could|will|is|are|does|do) not( to)? (be|being|need|get|require|have to be"
-    r"|need to be|want)( to be)? (\w+ly )?(paus|stop|halt|held|suspend|frozen|freez|cancel|remov|delet|drop|"
-    r"scrap|block|clos|rais|lower|add|resum|restart|releas|undone|revert|bump|prioriti|interrupt|wait)\w*"
+    r"\b(should|must|need|needs|ought|may|can|could|will|is|are|does|do) not( to)? (be|being"
+    r"|need|get|require|have to be"
+    r"|need to be|want)( to be)? (\w+ly )?(paus|stop|halt|held|suspend|frozen|freez|cancel"
+    r"|remov|delet|drop|"
+    r"scrap|block|clos|rais|lower|add|resum|restart|releas|undone|revert|bump|prioriti"
+    r"|interrupt|wait)\w*"
 )
 _NONE_SUCH = re.compile(
     r"\b(is|are|was|were) (not|never)( really| actually| even)? (any|a|an|one)\b|\bno such\b"
-    r"|\b(not|never) (see|find|spot|notice|have|got) (any|a|an)\b|\bno <kind>|\bnothing (is|at|between|from)\b"
+    r"|\b(not|never) (see|find|spot|notice|have|got) (any|a|an)\b|\bno <kind>|\bnothing (is"
+    r"|at|between|from)\b"
 )
 _SOUND = re.compile(
     r"\b(is|has|did) not (been )?(broken?|dead|fail(ed)?|stuck|damaged|down|out|lost)\b"
@@ -352,7 +363,9 @@ def _is_denied(line: str, intent: str) -> bool:
             rest,
         )
         rest = re.sub(r"\b(not|never) (bother|waste|trouble)\b", " ", rest)
-        rest = re.sub(r"\bno (need|point|use|reason|sense) (in|of|for|to|keeping|doing)\b", " ", rest)
+        rest = re.sub(
+            r"\bno (need|point|use|reason|sense) (in|of|for|to|keeping|doing)\b", " ", rest
+        )
     if intent == "obstacle_update":
         rest = re.sub(r"\b(no|not) (way|passage|access|go|entry|through\w*|there|yet)\b", " ", rest)
         if re.search(r"\bthere is no\b|\bno (<kind>|obstacle|wall|blockage)\b", rest):
@@ -438,34 +451,6 @@ def speaks_against(line: str, intent: str) -> bool:
     return pattern is not None and bool(re.search(pattern, line.strip(" .!")))
 
 
-_HARMLESS = re.compile(r"[^\w]|[a-z]|\d+", re.UNICODE)
-
-
-def strange(tokens: Sequence[Token], words: Container[str]) -> tuple[list[str], int]:
-    """Words that no instruction in training had, and how many plain words there are."""
-    plain = [one for one in tokens if one.kind == "word" and not _HARMLESS.fullmatch(one.text)]
-    return [one.raw for one in plain if one.text not in words], len(plain)
-
-
-_CLAUSES = {",", ".", ";", ":", "!", "and", "because", "since", "so", "but", "as", "for", "-"}
-
-
-def foreign(tokens: Sequence[Token], words: Container[str]) -> str | None:
-    """A word that no instruction in training had, beside a name or in an instruction without."""
-    clauses: list[list[Token]] = [[]]
-    for token in tokens:
-        if token.text in _CLAUSES and token.kind in ("word", "mark"):
-            clauses.append([])
-        else:
-            clauses[-1].append(token)
-    named = [part for part in clauses if any(one.kind not in ("word", "mark") for one in part)]
-    for token in (one for part in named or clauses for one in part):
-        plain = token.kind == "word" and not _HARMLESS.fullmatch(token.text)
-        if plain and token.text not in words:
-            return token.raw
-    return None
-
-
 _VAGUE = re.compile(
     r"(?:near|nearby|around|about|roughly|approximately|approx|circa|ca|close to|close by|closer to"
     r"|next to|beside|besides|behind|opposite|outside|past|beyond|towards|vicinity of|somewhere|by"
@@ -492,7 +477,8 @@ def is_vague(tokens: Sequence[Token], at: int) -> bool:
     if tokens[at].kind == "point":
         before = re.sub(r"\bbetween( the)?( points?| coordinates?)?$", "", before.strip())
         before = re.sub(
-            r"\b(\w+ed by|(go|get|gets|getting|pass|passes|come|comes|squeeze) past( from)?|past from)$",
+            r"\b(\w+ed by|(go|get|gets|getting|pass|passes|come|comes|squeeze) past( from)?"
+            r"|past from)$",
             "",
             before.strip(),
         )

@@ -53,7 +53,8 @@ KINDS = {
 
 ALL_ROBOTS = re.compile(
     r"\b(?:(?:all|every|each)(?: of)?(?: the| our| my| single)? (?:robots?|bots?|units?|machines?|"
-    r"vehicles?|fleet)|everyone|everybody|everything|(?:the )?(?:whole|entire) (?:fleet|team)|"
+    r"vehicles?|fleet)|everyone|everybody|everything|all traffic|them all|you all"
+    r"|(?:the )?(?:whole|entire) (?:fleet|team)|"
     r"the (?:fleet|robots|bots|team)|all units|all of them|all of you(?: robots)?|you all"
     r"|you robots)\b"
 )

@@ -44,6 +44,8 @@ _SHORT = {
     "wiht": "with", "wih": "with", "htere": "there", "ther": "there", "od": "do",
     "plaese": "please", "bto": "bot", "rbot": "robot", "jbo": "job", "stpo": "stop", "sotp": "stop",
     "pasue": "pause", "puase": "pause", "hihg": "high", "hgih": "high", "lwo": "low", "nto": "not",
+    "udno": "undo", "unod": "undo", "brokn": "broken", "borken": "broken", "gonne": "gone",
+    "cancle": "cancel", "canel": "cancel", "prioratise": "prioritize", "priortise": "prioritize",
     "thsi": "this", "tihs": "this",
 }  # fmt: skip
 """Slips in words too short to be mended by themselves."""

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from oath.commands import COMMANDS, Command
 from oath.instruct import Reply
-from oath.instruct.offline import clear, gates, questions, slots
+from oath.instruct.offline import clear, gates, questions, slots, unheard
 from oath.instruct.offline.heard import Filled, Heard
 from oath.instruct.offline.names import NOUNS
 from oath.instruct.offline.spelling import guarding
@@ -20,9 +20,20 @@ from oath.instruct.offline.tokens import Token
 _ROOMY = ("add_task", "obstacle_update", "query_status")
 """Intents told with many words that do not matter, such as what is carried."""
 
-_ASIDES = frozenset(
-    ("oh", "uh", "um", "er", "eh", "ah", "hmm", "huh", "yo", "both", "guys", "folks", "mate", "ta")
-)
+_MANNERS = {
+    "oh", "uh", "um", "er", "eh", "ah", "hmm", "huh", "yo", "both", "guys", "folks", "mate",
+    "ta", "thx", "thnx", "ty", "tysm", "tks", "fr", "frfr", "ngl", "tbh", "lol", "lmao", "nvm",
+    "omg", "bruh", "bro", "kk", "imo", "imho", "rn", "atm", "smh", "btw", "fyi", "aye", "och",
+    "wee", "lad", "lads", "lassie", "poor", "dear", "bloody", "damn", "damned", "darn",
+    "bleeding", "ruddy", "flipping", "freaking", "frigging", "stupid", "silly", "wretched",
+    "pesky", "trusty", "faithful", "chaps", "gents", "chap", "fellas", "peeps", "yall", "lovely",
+    "cheers", "sadly", "unfortunately", "alas", "luckily", "thankfully", "fortunately",
+    "regrettably", "clearly", "obviously", "indeed", "literally", "simply", "kindly", "blasted",
+    "blooming", "lousy", "rotten", "goddamn", "innit", "ye", "yer", "thee", "mon", "amigo",
+    "amigos", "hombre", "cap'n", "skipper", "sarge", "guv", "gaffer", "squire", "milord",
+    "ladies", "gentlemen", "team", "crew", "y'all",
+}  # fmt: skip
+"""Words that change nothing, wherever they stand."""
 
 LIKELY = 0.6
 """How probable an intent must be to be acted on."""
@@ -124,9 +135,11 @@ def _one(heard: Heard) -> Reply:
         return Reply(status="clarification", intent=meant.intent, message=say)
     if why := _in_one(heard, meant.intent):
         return Reply(status="clarification", intent=meant.intent, message=why)
-    odd = len(gates.strange(heard.tokens, heard.models.words)[0])
-    foreign = meant.intent not in _ROOMY and gates.foreign(
-        heard.tokens, heard.models.words | guarding() | NOUNS["robot"] | _ASIDES
+    odd = len(unheard.strange(heard.tokens, heard.models.words)[0])
+    foreign = meant.intent not in _ROOMY and unheard.foreign(
+        heard.tokens,
+        heard.models.words | guarding() | NOUNS["robot"] | _MANNERS,
+        lambda clause: clear.means(clause, meant.intent),
     )
     if foreign:
         say = (
@@ -257,7 +270,7 @@ def leftover(heard: Heard, intent: str) -> str | None:
             f"What is '{numbers[0].raw}'? I take points as pairs in metres, e.g. (5, 19.5); say it "
             "without other numbers."
         )
-    odd, plain = gates.strange(heard.tokens, heard.models.words)
+    odd, plain = unheard.strange(heard.tokens, heard.models.words)
     if len(odd) >= 3 or (len(odd) == 2 and plain <= 4):
         shown = ", ".join(repr(one) for one in odd[:4])
         return f"I do not know the words {shown}. Say it differently."
