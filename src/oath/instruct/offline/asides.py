@@ -23,6 +23,12 @@ _WHY = re.compile(
 )
 """Begins a reason or a purpose."""
 
+_SO_FAR = re.compile(
+    r"\b(ever )?since (early |late )?(this morning|yesterday|last night|noon|dawn|today|breakfast"
+    r"|lunch|lunchtime|midnight)\b"
+)
+"""Tells that what began then is still so."""
+
 _BEARS = re.compile(
     r"\b(first|last|before|after|later|sooner|earlier|next|urgen\w*|priorit\w*|wait\w*"
     r"|rush\w*|hurry"
@@ -98,15 +104,16 @@ def without_asides(tokens: Sequence[Token], words: frozenset[str]) -> tuple[Toke
     `words` are those of everyday instructions. A piece is kept if a gate may have to see it, or if
     it may say by itself what is to be done.
     """
+    if found := _SO_FAR.search(gates.as_line(tokens)):
+        at = found.string[: found.start()].count(" ")
+        tokens = [*tokens[:at], *tokens[at + found[0].count(" ") + 1 :]]
     kept: list[Token] = []
     for piece in _pieces(tokens):
         body, why = _without_reason(piece, words)
         if why and not _is_bare(body):
             kept += body
-        elif _is_bare(piece) and (
-            _is_manners(piece)
-            or _is_strange(piece, words)
-            or (kept and _is_reason(gates.as_line(piece)))
+        elif _is_manners(piece) or (
+            _is_bare(piece) and (_is_strange(piece, words) or (kept and _is_reason(piece)))
         ):
             continue
         else:
@@ -131,7 +138,8 @@ def _is_bare(tokens: Sequence[Token]) -> bool:
 
 
 def _is_manners(piece: Sequence[Token]) -> bool:
-    return bool(_COURTESY.fullmatch(gates.as_line(piece).strip()))
+    line = " ".join(one.text for one in piece)
+    return bool(_COURTESY.fullmatch(line))
 
 
 def _is_strange(piece: Sequence[Token], words: frozenset[str]) -> bool:
@@ -165,8 +173,9 @@ _UNSURE = re.compile(
 )
 
 
-def _is_reason(line: str) -> bool:
+def _is_reason(piece: Sequence[Token]) -> bool:
     """Whether a piece only says how things are, and nothing that bears on what is to be done."""
+    line = gates.as_line(piece)
     if not _DECLARES.search(line) or said_priority(line):
         return False
     return not (_WEIGHS.search(line) or _UNSURE.search(line))
@@ -196,12 +205,13 @@ def _without_reason(
         told = gates.as_line(why)
         if not _is_bare(why) or len(why) > _LONGEST or said_priority(told):
             continue
-        if _WEIGHS.search(told) or gates.doubtful(told, "add_task") is not None:
+        if _WEIGHS.search(told) or gates.doubtful(_SOME.sub(" ", told), "add_task"):
             continue
         return list(piece[:at]), why
     return list(piece), []
 
 
+_SOME = re.compile(r"\b(some|any)(where|place)\b")
 _HALF_OF_AS = re.compile(r"\b(as|same|as \w+|just|such|far|long|soon|well|much|so \w+) *$")
 
 _WEIGHS = re.compile(

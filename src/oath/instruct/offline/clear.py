@@ -305,7 +305,7 @@ _TAKEN_BACK = re.compile(
     r"\b(better not|rather not|(on|having) second thoughts?|no ,? ?wait|wait ,? ?no"
     r"|or (rather )?wait"
     r"|or not|actually ,? ?(no|not)|maybe not|hang on|strike that|nah|no ,? do not"
-    r"|please do not|or no)\b"
+    r"|please do not(?! (drive|go|enter|cross|use|pass|let|move))|or no)\b"
 )
 _BUT = re.compile(r"\bbut (?!(?:please|now|first|thanks|thank|quickly|fast|hurry|quick)\b)[^<]*$")
 _CAME = re.compile(

@@ -173,6 +173,8 @@ def _fill(heard: Heard, draft: Draft, filled: Filled) -> bool:
             _fill_name(heard, filled, "robot", list(heard.live.state.robots))
     found = filled.parameters != before or bool(filled.trouble)
     found = found or any(one.kind not in ("word", "mark", "number") for one in heard.tokens)
+    if draft.intent == "change_task_priority" and "priority" not in filled.parameters:
+        filled.missing.append("priority")
     fields = COMMANDS[draft.intent].model_fields
     for name in (*draft.missing, *(name for name, one in fields.items() if one.is_required())):
         short = name == "obstacle_location" and len(filled.parameters.get(name, ())) < 2
@@ -332,7 +334,8 @@ def _end(line: str) -> int | None:
 def _fill_label(heard: Heard, draft: Draft, filled: Filled) -> None:
     if draft.intent == "change_task_priority":
         said = new_task.said_priority(_NOT_SO.sub(" ", heard.line))
-        said |= {one.text for one in heard.tokens if one.text in ("low", "normal", "high")}
+        plain = _NOT_SO.sub(" ", " ".join(one.text for one in heard.tokens))
+        said |= set(re.findall(r"\b(low|normal|high)\b", plain))
         if len(said) == 1:
             filled.parameters["priority"] = said.pop()
         elif said:

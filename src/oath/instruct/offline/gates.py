@@ -79,7 +79,8 @@ _ASKS = re.compile(
     r"(?! (?:ask|request|trouble|bother|beg) you to\b)"
     r"|(?:should|shall|must|may|might)(?: the)? <\w+>)"
     r"|^(?:can|could|would|will|might|may) <robot>(?!.*\bplease\b)(?! (?:stop|wait|hold|pause"
-    r"|continue|go|resume|proceed|stand|stay|halt|move|carry on|drive|start|freeze|be)\b)"
+    r"|continue|go|resume|proceed|stand|stay|halt|move|carry|drive|start|freeze|be|take|bring"
+    r"|deliver|fetch|collect|pick|get|transport)\b)"
 )
 _ASKS_FOR = re.compile(
     r"^(can|could|would|will) |\bi (want|need|would (like|love|need))\b|\bask you to\b|\b(can"
@@ -376,7 +377,8 @@ def _is_denied(line: str, intent: str) -> bool:
         )
     if intent == "robot_failed":
         rest = re.sub(
-            r"\bnot (\w+ )?(mov|go|driv|work|run|start|react|answer|plan|count|reckon|rely"
+            r"\bnot (\w+ )?(mov|go|driv|work|run|restart|boot|wake|charge|come|turn|start"
+            r"|react|answer|plan|count|reckon|rely"
             r"|use)\w*\b",
             " ",
             rest,
