@@ -348,7 +348,8 @@ def _is_denied(line: str, intent: str) -> bool:
         intent == "robot_failed" and _SOUND.search(line)
     ):
         return True
-    if intent != "cancel_task" and _PASSIVE.search(line):
+    passive = _PASSIVE.search(line)
+    if passive and (intent != "cancel_task" or passive[0].endswith(("cancelled", "dropped"))):
         return True
     if intent == "obstacle_update" and _NONE_SUCH.search(line):
         return True
@@ -430,7 +431,8 @@ _AGAINST = {
     "resume_robot": r"(?<!off )(?<!the )\b(stop|pause|hold|halt|wait|freeze)$",
     "cancel_task": r"\b(not|never) (\w+ )?(forget|miss|lose)\b"
     r"|\b(without delay|urgent|asap|first|just normal|high|priority)\b",
-    "add_task": r"\b(cancel|delete|remove|abort|undo|wall|obstacle|blocked)\b",
+    "add_task": r"\b(cancel|delete|remove|abort|undo|wall|obstacle|block(ed|s)"
+    r"|parked (his|her)|toppled)\b",
 }
 """Words that speak against an intent, however likely the rest makes it."""
 
