@@ -488,7 +488,7 @@ class Chaos:
             self.apply(events[0])
         else:
             pytest.fail("the mission does not end")
-        # Nothing is in flight any more: dispatch must have said that this is the end.
+        # The end: nothing is in flight any more, and nobody has anything left to do.
         assert not self.state.allocating
         assert not any(robot.route for robot in self.state.robots.values())
 
