@@ -84,20 +84,20 @@ def rows(name: str, answer: Callable[[Utterance], Reply] = knows) -> list[Row]:
 # -- the data
 
 
-@pytest.mark.parametrize(("name", "enough"), [("first", 450), ("second", 450), ("held-out", 440)])
+@pytest.mark.parametrize(("name", "enough"), [("validation", 440), ("held-out", 480)])
 def test_there_are_many_utterances_of_every_kind_and_intent(name: str, enough: int) -> None:
     said = ALL[name]
     assert len(said) >= enough and len({one.family for one in said}) >= 45
     assert len({one.turns for one in said}) == len(said)
     assert sum(one.intent in PAPERS for one in said) >= 200
     full = Counter(one.intent for one in said if one.kind == "full")
-    assert set(full) == set(COMMANDS) and min(full.values()) >= 10
+    assert set(full) == set(COMMANDS) and min(full.values()) >= 7
     assert {one.kind for one in said} == set(KINDS)
 
 
 def test_there_are_dialogues() -> None:
-    said = [*ALL["first dialogues"], *ALL["second dialogues"], *ALL["dialogues"]]
-    assert len(said) >= 85 and len(ALL["dialogues"]) >= 20
+    said = [one for name in ALL if "dialogues" in name for one in ALL[name]]
+    assert len(said) >= 110 and len(ALL["dialogues"]) >= 20
     assert len({one.turns for one in said}) == len(said)
     assert all(2 <= len(one.turns) <= 4 for one in said)
 
@@ -105,9 +105,8 @@ def test_there_are_dialogues() -> None:
 @pytest.mark.parametrize(
     ("name", "earlier"),
     [
-        ("second", ["first"]),
-        ("held-out", ["first", "second"]),
-        ("dialogues", ["first dialogues", "second dialogues"]),
+        ("held-out", ["validation"]),
+        ("dialogues", ["seen dialogues", "validation dialogues"]),
     ],
 )
 def test_a_later_set_repeats_nothing_of_the_earlier(name: str, earlier: list[str]) -> None:
@@ -188,8 +187,9 @@ def one_of(kind: str, intent: str) -> Utterance:
 def test_a_pause_that_nobody_asked_for_was_acted_on() -> None:
     pause = complete(parse({"intent": "pause_robot", "parameters": {"robot": "robot1"}}))
     one = one_of("ambiguous", "add_task")
-    verdict = judge(Fake([one], lambda _: pause), one, LIVE)
-    assert verdict.wrong and verdict.acted
+    for plain in (False, True):
+        verdict = judge(Fake([one], lambda _: replace(pause, plain=plain)), one, LIVE)  # noqa: B023
+        assert verdict.wrong and verdict.acted == plain
 
 
 def test_the_status_is_a_fair_answer_to_some_questions_only() -> None:
@@ -295,7 +295,7 @@ def test_table_figure_and_finding() -> None:
     assert main["right [%]"] == main["intent right [%]"] == main["slots exact [%]"] == 100
     assert main["wrong proposals [%]"] == main["needless questions [%]"] == 0
     assert main["ambiguous asked about [%]"] == 100
-    assert f"{TITLES['held-out']}: family ward-nurse" in read
+    assert f"{TITLES['held-out']}: family {some('held-out')[0].family}" in read
     assert markdown(list(read.values()))
     chosen.plot(measured).canvas.draw()
     text = chosen.finding(measured)

@@ -41,7 +41,13 @@ class Parrot:
             return Reply(status="clarification", message="What do you mean?")
         if isinstance(meant, Reply):
             return meant
-        return Reply(status="complete", message="", intent=meant[0].intent, commands=tuple(meant))
+        return Reply(
+            status="complete",
+            message="",
+            intent=meant[0].intent,
+            commands=tuple(meant),
+            plain=True,
+        )
 
 
 class Clock:
@@ -171,6 +177,18 @@ def test_what_makes_things_safer_is_done_at_once(runtime: Runtime, talk: Talk) -
     both = talk(both=[CANCEL, command("pause_robot", robot="r2")]).say("both")
     assert runtime.state.paused == {"r1", "r2"}
     assert both.proposal is not None and both.proposal.commands == (CANCEL,)
+
+
+def test_what_is_not_plainly_said_is_read_back_even_if_it_is_safer(
+    runtime: Runtime, talk: Talk
+) -> None:
+    wordy = Reply(status="complete", message="", intent="pause_robot", commands=(PAUSE,))
+    speaking = talk(wordy=wordy)
+    answer = speaking.say("wordy")
+    assert answer.proposal is not None and not answer.done
+    assert not runtime.state.paused
+    speaking.say("yes")
+    assert runtime.state.paused == {"r1"}
 
 
 def test_several_commands_are_read_back_and_happen_together(runtime: Runtime, talk: Talk) -> None:

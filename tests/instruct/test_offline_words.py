@@ -20,7 +20,8 @@ WORLD = Names(
     obstacles={"wall1": "wall-1"},
     kinds={"wall": "wall", "bush": "bush"},
     types={"normal": "normal", "special": "special"},
-    words=frozenset({"the", "should", "is"}),
+    everyday=frozenset({"the", "should", "is"}),
+    label=lambda before, after: float(before[-1:] in (["cancel"], ["task"])),
 )
 
 
@@ -77,7 +78,8 @@ def test_numbers(text: str, values: list[float | None]) -> None:
         ("five", []),
         ("(1, 2, 3)", []),
         ("5, 6, 7", []),
-        ("2 by 3", []),
+        ("2 by 3", [(2, 3)]),
+        ("2 by 3 at 5, 5", [(5, 5)]),
         ("5-7", []),
         ("grid 5-7", [(5, 7)]),
         ("at 2 by 3.5", [(2, 3.5)]),
@@ -159,7 +161,7 @@ def test_names(text: str, kind: str, values: list[str | None]) -> None:
 )
 def test_slips_in_everyday_words_are_mended(text: str, words: str) -> None:
     known = replace(
-        WORLD, words=frozenset(("cancel", "task", "the", "increase", "priority", "free"))
+        WORLD, known=frozenset(("cancel", "task", "the", "increase", "priority", "free"))
     )
     assert " ".join(one.text for one in tag(text, known)) == words
 

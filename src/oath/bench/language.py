@@ -20,6 +20,7 @@ from oath.bench.utterances import (
     instructions,
     judge,
     paper_right,
+    validation,
     world,
 )
 from oath.commands import COMMANDS
@@ -34,27 +35,25 @@ OFFLINE = "oath.instruct.offline:Offline"
 
 SETS: dict[str, Callable[[], list[Utterance]]] = {
     "paper": instructions,
-    "held-out": lambda: heldout("heldout-3"),
-    "dialogues": lambda: dialogues("dialogues-3"),
-    "second": lambda: heldout("heldout-2"),
-    "second dialogues": lambda: dialogues("dialogues-2"),
-    "first": heldout,
-    "first dialogues": dialogues,
+    "held-out": heldout,
+    "dialogues": lambda: dialogues("heldout-dialogues"),
+    "validation": validation,
+    "validation dialogues": lambda: dialogues("validation-dialogues"),
+    "seen dialogues": dialogues,
 }
 TITLES = {
     "paper": "the paper's 90",
     "held-out": "held-out",
     "dialogues": "held-out dialogues",
-    "second": "second set",
-    "second dialogues": "second dialogues",
-    "first": "first set",
-    "first dialogues": "first dialogues",
+    "validation": "validation",
+    "validation dialogues": "validation dialogues",
+    "seen dialogues": "seen dialogues",
 }
 MAIN = "held-out"
 """The set whose figures are published.
 
-The first and the second set were seen while the interpreter was written; this one was not, and
-nobody who improves an interpreter may look at it.
+Nobody who improves an interpreter may look at it. The validation set is like it, but its scores
+were looked at while the interpreter was written.
 """
 
 PAPER_RIGHT = 83
@@ -301,25 +300,27 @@ def finding(rows: Sequence[Row]) -> str:
         f"{_shown(main['slots exact [%]'])} of what is said in full, "
         f"{_shown(main['needless questions [%]'])} of it is asked about needlessly, and "
         f"{_shown(main['ambiguous asked about [%]'])} of what is ambiguous is asked about. Of the "
-        f"dialogues {_shown(shares[TITLES['dialogues']]['right [%]'])} end as they should. (Seen "
-        f"while the interpreter was written: {_seen(shares, 'second')}; {_seen(shares, 'first')}.) "
+        f"dialogues {_shown(shares[TITLES['dialogues']]['right [%]'])} end as they should. "
+        f"({_validated(shares)}) "
         f"Wrong proposals: {sum(row['wrong'] for row in paper)} to the paper's instructions, "
         f"{sum(row['wrong'] for row in held)} to the {len(held)} held-out utterances and dialogues "
         f"({_shown(_percent(held, lambda row: row['wrong']))}; "
         f"{sum(row['wrong reply'] for row in held)} with those that the gate refuses), "
-        f"{sum(row['acted'] for row in held)} of them carried out at once, as pauses are, and "
-        f"{sum(row['told'] for row in held)} of them only told the status. An "
+        f"{sum(row['acted'] for row in held)} of them carried out at once, as plain pauses are, "
+        f"and {sum(row['told'] for row in held)} of them only told the status. An "
         f"interpretation takes {np.median(times):.2f} ms (p50) and {np.percentile(times, 95):.2f} "
         f"ms (p95), the first of a process {max(row['ms'] for row in first):.1f} ms, after "
         f"{max(row['loading ms'] for row in first):.0f} ms to load the interpreter."
     )
 
 
-def _seen(shares: dict[str, Row], name: str) -> str:
-    row = shares[TITLES[name]]
+def _validated(shares: dict[str, Row]) -> str:
+    row = shares[TITLES["validation"]]
     return (
-        f"{TITLES[name]}: intents {_shown(row['intent right [%]'])}, slots "
-        f"{_shown(row['slots exact [%]'])}, wrong {_shown(row['wrong proposals [%]'])}"
+        f"Validation set: intents {_shown(row['intent right [%]'])}, slots "
+        f"{_shown(row['slots exact [%]'])}, needless questions "
+        f"{_shown(row['needless questions [%]'])}, wrong {_shown(row['wrong proposals [%]'])}, "
+        f"ambiguous asked about {_shown(row['ambiguous asked about [%]'])}."
     )
 
 
@@ -333,7 +334,8 @@ STUDY = Study(
     asked="Does the interpreter take an operator's words for what was meant, ask about what is "
     "missing or ambiguous, and never propose what was not said? The paper's ninety instructions, "
     "and utterances and dialogues in families of wording that nobody who wrote rules or training "
-    "data had seen; the first and the second set were seen while the interpreter was written. "
+    "data had seen; of the validation set only the scores were seen while the interpreter was "
+    "written. "
     "*Right* is: what is said in full is proposed exactly; exactly what is missing "
     "is asked for; what is ambiguous is not acted on; what is no command leads to nothing. For the "
     "paper's instructions *right* is: the intent is, and nothing but what was said is proposed; "

@@ -3,11 +3,12 @@
 Several sets lie beside this file. ``instructions-90.csv`` holds the ninety instructions of Li, Ren,
 Miller, Coogan, Feigh, Zhao, "Adaptive Obstacle-Aware Task Assignment and Planning for Heterogeneous
 Robot Teaming", 2025, with the paper's intent, and our own judgement of what the right answer on
-the paper's maze is. ``heldout*.csv`` and ``dialogues*.jsonl`` are ours: utterances in families,
-each family the wording of one imagined kind of person, and short dialogues with what they come to.
-Whoever wrote them knew no interpreter's rules or training data, and fixed the meanings first. The
-first and the second set were seen while the interpreter was written; the third may never be shown
-to those who improve one.
+the paper's maze is. The others are ours: utterances in families, each family the wording of one
+imagined kind of person, and short dialogues with what they come to. Whoever wrote them knew no
+interpreter's rules or training data. ``heldout.csv`` and ``heldout-dialogues.jsonl`` may never be
+shown to those who improve an interpreter; somebody else has judged their meanings a second time.
+``validation.csv`` and ``validation-dialogues.jsonl`` were not shown either, but their scores were
+looked at while the interpreter was written. ``dialogues.jsonl`` was seen.
 
 Kinds: ``full`` says all that is needed, and a careful colleague would act on it; of ``partial`` the
 intent is clear but a slot is missing; ``ambiguous`` has to be asked about, if not refused; ``none``
@@ -98,9 +99,19 @@ class Utterance:
         return self.intent == ResumeRobot.intent
 
 
-def heldout(name: str = "heldout") -> list[Utterance]:
-    """Read a set of single utterances, ``NAME.csv``."""
-    with (HERE / f"{name}.csv").open(encoding="utf-8", newline="") as file:
+def heldout() -> list[Utterance]:
+    """Read what nobody has seen who improves an interpreter."""
+    return read(HERE / "heldout.csv")
+
+
+def validation() -> list[Utterance]:
+    """Read what was only scored while the interpreter was written."""
+    return read(HERE / "validation.csv")
+
+
+def read(path: Path) -> list[Utterance]:
+    """Read a file of single utterances."""
+    with path.open(encoding="utf-8", newline="") as file:
         return [_utterance(row, (row["text"],)) for row in csv.DictReader(file)]
 
 
@@ -299,8 +310,8 @@ def same(got: Sequence[Command], meant: Sequence[Command], live: Live, *, kinds:
     got, meant
         What an interpreter replied, and what was meant, each with what was said and no more.
     kinds
-        The kind of an obstacle must be the one that was said; if not, it may be lost, but another
-        one is still wrong.
+        The kind of an obstacle must be the one that was said, by its last word (a mail trolley is
+        a trolley); if not, it may be lost, but another one is still wrong.
     """
     left = list(got)
     for one in meant:
@@ -316,7 +327,8 @@ def _alike(got: Command, meant: Command, live: Live, kinds: bool) -> bool:
         here, there = got.obstacle_location, meant.obstacle_location
         kind, said = (got.obstacle_type or "").casefold(), (meant.obstacle_type or "").casefold()
         lost = not kind or kind in NO_KIND
-        fits = kind == said or kind.split()[-1:] == [said] or (said in NO_KIND | {""} and lost)
+        head = kind.split()[-1:] == said.split()[-1:]
+        fits = head or (said in NO_KIND | {""} and lost)
         return _outline(here) in _turned(there) and (fits or (lost and not kinds))
     try:
         return got.filled(live) == meant.filled(live)

@@ -121,7 +121,7 @@ def chat(
 ) -> None:
     """Run a mission live and talk to it in the terminal; end with an empty line or Ctrl-D.
 
-    What is proposed is carried out after a yes; pause takes effect at once.
+    What is proposed is carried out after a yes; a plain pause takes effect at once.
     """
     import oath
 

@@ -47,6 +47,8 @@ class Reply:
         To the operator: a question about exactly what is missing, with an example, or a reason.
     commands
         Several, if one sentence asks for several. They have not passed the gate yet.
+    plain
+        The words say nothing but the commands, so what is immediate may happen unconfirmed.
     note
         What the operator must hear besides, whatever becomes of the reply: that a language model
         did not answer.
@@ -58,6 +60,7 @@ class Reply:
     parameters: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     missing: tuple[str, ...] = ()
     commands: tuple[Command, ...] = ()
+    plain: bool = False
     note: str = ""
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from oath.commands import Command, Live, admit, to_plain
+from oath.commands import Command, Live, QueryStatus, admit, to_plain
 from oath.errors import BadInput
 from oath.instruct import Dialogue, Draft, Interpreter, Reply
 
@@ -68,7 +68,8 @@ class Conversation:
 
     Laws: a command is carried out only if its proposal is confirmed by its id or by a plain yes
     right after it was read back, once, before it expires, and while the world that it was made for
-    has not changed; what makes things safer (`Command.immediate`) is carried out at once.
+    has not changed; what makes things safer (`Command.immediate`) is carried out at once if it is
+    plainly said.
 
     Parameters
     ----------
@@ -200,9 +201,9 @@ class Conversation:
         return Answer(reply=replace(reply, message=done), done=proposal.commands)
 
     def _propose(self, reply: Reply) -> Answer:
-        """Carry out what is immediate, read the rest back."""
-        at_once = tuple(command for command in reply.commands if command.immediate)
-        rest = tuple(command for command in reply.commands if not command.immediate)
+        """Carry out what is immediate and plainly said or changes nothing; read the rest back."""
+        at_once = tuple(one for one in reply.commands if self._is_immediate(one, reply))
+        rest = tuple(one for one in reply.commands if one not in at_once)
         try:
             done = admit(self._live(), at_once)
             if done.events:
@@ -239,6 +240,9 @@ class Conversation:
         read_back = replace(reply, message=message, commands=admitted.commands)
         return Answer(reply=read_back, proposal=self.pending, done=at_once)
 
+    def _is_immediate(self, command: Command, reply: Reply) -> bool:
+        return command.immediate and (reply.plain or isinstance(command, QueryStatus))
+
     def _note(self, commands: Sequence[Command]) -> None:
         """Remember what may be corrected next: one command that was read back or done."""
         self._draft = None
@@ -265,6 +269,7 @@ def _complete(commands: Sequence[Command]) -> Reply:
         intent=plain["intent"],
         parameters=plain["parameters"],
         commands=tuple(commands),
+        plain=True,
     )
 
 

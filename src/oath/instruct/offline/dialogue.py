@@ -38,7 +38,6 @@ _CORRECTS = re.compile(
 
 
 _NOT_SO = re.compile(r"\b(not|instead of|rather than) (a )?(high|low|normal|urgent)( priority)?\b")
-_ORDINALS = re.compile(r"\b(first|second|third|last) (point|end|corner|one|coordinate)\b")
 
 
 def follow_up(heard: Heard, draft: Draft) -> Reply:
@@ -61,8 +60,7 @@ def follow_up(heard: Heard, draft: Draft) -> Reply:
     if _AXIS.search(heard.line):
         rest = tuple(one for one in heard.tokens if one.kind != "number")
         heard = replace(heard, tokens=rest)
-    why = gates.not_meant(_ORDINALS.sub(" ", heard.line), draft.intent)
-    if why is not None and not filled.trouble and "not to do" not in why:
+    if why := gates.reason(heard.tokens, heard.models.concepts, gates.IN_ANSWERS):
         filled.object_to(f"{why} Say it plainly if that is meant.")
     return answer(heard, draft.intent, filled)
 
@@ -232,7 +230,7 @@ def _fill_task(heard: Heard, draft: Draft, filled: Filled) -> None:
     words = [one for one in heard.tokens if one.kind not in ("mark",)]
     bare = len(words) == 1 and words[0].kind in ("word", "unknown_label")
     asked = "task_label" in draft.missing
-    asked = asked or (bare and not draft.missing and words[0].text not in heard.models.words)
+    asked = asked or (bare and not draft.missing and words[0].text not in heard.models.known)
     if bare and asked and not extra.parameters and re.fullmatch(r"\w[\w.-]{0,31}", words[0].raw):
         filled.parameters["task_label"] = words[0].raw
     spots = [n for n, one in enumerate(heard.tokens) if one.kind in _SPOTS]
@@ -298,9 +296,9 @@ def _asked_spot(heard: Heard, draft: Draft, at: int) -> str | None:
 
 
 def _fill_obstacle(heard: Heard, filled: Filled) -> None:
-    kinds = {str(one.value) for one in heard.of("kind")}
-    if len(kinds) == 1:
-        filled.parameters["obstacle_type"] = kinds.pop()
+    kind = slots.called(heard, extra := Filled())
+    if kind and not extra.signs:
+        filled.parameters["obstacle_type"] = kind
     points: list[Point] = []
     for n, token in enumerate(heard.tokens):
         if token.kind == "point":
@@ -343,7 +341,7 @@ def _fill_label(heard: Heard, draft: Draft, filled: Filled) -> None:
     told = ("label", "unknown_label", "point", "place")
     if heard.of(*told):
         filled.parameters.pop("task_label", None)
-        slots.read_task(heard, filled)
+        slots.read_task(heard, filled, draft.intent)
     elif words := _strange_name(heard):
         filled.object_to(
             f"There is no task '{words.raw}'. {questions.ask_label(heard)}", "task_label"
@@ -353,7 +351,7 @@ def _fill_label(heard: Heard, draft: Draft, filled: Filled) -> None:
 def _strange_name(heard: Heard) -> Token | None:
     """The one word of an answer, if it is none that is known."""
     words = [one for one in heard.tokens if one.kind == "word"]
-    known = heard.models.words
+    known = heard.models.known
     return words[0] if len(words) == 1 and words[0].text not in known else None
 
 

@@ -48,12 +48,18 @@ class Filled:
         Parameters to ask for.
     trouble
         A question or reason that keeps it from being proposed.
+    doubt
+        The parameter to ask for, and how, if the instruction turns out to be unclear.
+    signs
+        What in the reading may make it doubtful, for the model of what is clear.
     """
 
     parameters: dict[str, Any] = field(default_factory=dict)
     several: list[str] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
     trouble: str = ""
+    doubt: tuple[str, str] | None = None
+    signs: set[str] = field(default_factory=set)
 
     def object_to(self, why: str, parameter: str | None = None) -> None:
         """Ask about the first thing that is wrong."""

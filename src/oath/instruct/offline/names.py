@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from functools import lru_cache, partial
 
 from oath.commands import Live
 from oath.instruct.offline.axes import read_axes
+from oath.instruct.offline.model import Models
 from oath.instruct.offline.spelling import mended, spelled
 from oath.instruct.offline.tokens import Token, clean, lex, read_numbers, read_points
 
@@ -51,13 +52,20 @@ KINDS = {
 }  # fmt: skip
 """What obstacles are called anywhere, besides the kinds of the live world."""
 
+_FLEET = "fleet|team|squad|crew|gang|herd|pack|lot|bunch|company|platoon|armada|flock"
 ALL_ROBOTS = re.compile(
-    r"\b(?:(?:all|every|each)(?: of)?(?: the| our| my| single)? (?:robots?|bots?|units?|machines?|"
-    r"vehicles?|fleet)|everyone|everybody|everything|all traffic|them all|you all"
-    r"|(?:the )?(?:whole|entire) (?:fleet|team)|"
-    r"the (?:fleet|robots|bots|team)|all units|all of them|all of you(?: robots)?|you all"
-    r"|you robots)\b"
+    r"(?:all|every|each)(?: of)?(?: the| our| my| them| those| these| single| damn| bloody)?"
+    r"(?: <count>)? (?:robots?|bots?|units?|machines?|vehicles?|fleet|robos?)"
+    r"|all(?: of)?(?: the)? <count>(?: of (?:them|you|em|us))?|(?:the|our|my|you) <count>"
+    r"(?: robots| bots| units| machines)?"
+    r"|everyone|everybody|everything|every1|all traffic|(?:them|em|you|ya) all|y'all robots"
+    rf"|(?:the )?(?:whole|entire) (?:{_FLEET})(?: of (?:them|you|em))?"
+    r"|the (?:fleet|robots|bots|team)|all units|all of (?:them|em)|all of you(?: robots| lot)?"
+    r"|you robots|(?:the|every) (?:whole )?lot (?:of|o) (?:them|you|em|ya)"
+    r"|every(?: single| last)? one of (?:them|you|em|the robots|the bots)(?: robots| bots)?"
+    r"|robots 1 (?:to|through|thru|till|until|-) <count>"
 )
+"""Ways to name every robot; ``<count>`` is how many there are."""
 
 _COMMON = frozenset(
     [
@@ -163,11 +171,15 @@ class Names:
     obstacles: Mapping[str, str]
     kinds: Mapping[str, str]
     types: Mapping[str, str]
-    words: frozenset[str] = frozenset()
+    everyday: frozenset[str] = frozenset()
     """Words of everyday instructions: a name that is one of them needs a noun in front."""
+    known: frozenset[str] = frozenset()
+    """Words in which no slip is seen."""
+    label: Callable[[Sequence[str], Sequence[str]], float] = lambda before, after: 0.0
+    """How likely an everyday word, as ``be``, is a label here: by the words around it."""
 
     @classmethod
-    def of(cls, live: Live, words: frozenset[str] = frozenset()) -> Names:
+    def of(cls, live: Live, trained: Models) -> Names:
         """The names of the live world."""
         state, mission = live.state, live.scene.mission
         kinds = {one.kind for one in (*state.obstacles.values(), *state.hidden.values())}
@@ -178,9 +190,11 @@ class Names:
             robots=_keyed(state.robots),
             labels=_keyed(state.tasks),
             obstacles=_keyed(state.obstacles),
-            kinds={_single(kind): kind for kind in sorted(KINDS | kinds, key=lambda k: k in kinds)},
+            kinds={single(kind): kind for kind in sorted(KINDS | kinds, key=lambda k: k in kinds)},
             types=_keyed(mission.task_types),
-            words=words,
+            everyday=trained.everyday,
+            known=trained.known,
+            label=trained.label,
         )
 
     def groups(self) -> tuple[tuple[str, Mapping[str, str]], ...]:
@@ -205,28 +219,31 @@ def key(name: str) -> str:
     return "".join(one for one in name.casefold() if one.isalnum())
 
 
-def _single(word: str) -> str:
+def single(word: str) -> str:
     word = word.casefold()
     if word.endswith(("shes", "xes", "ches")):
         return word[:-2]
     return word[:-1] if word.endswith("s") and not word.endswith(("ss", "is")) else word
 
 
+def plain(text: str) -> list[Token]:
+    """Return the words, numbers and marks of a text."""
+    return read_numbers(lex(clean(text)))
+
+
 def tag(text: str, names: Names) -> list[Token]:
     """Return the tokens of an instruction, its entities found."""
-    tokens = read_numbers(lex(clean(text)))
-    tokens = _named(tokens, names)
-    tokens = mended(tokens, names.words, partial(_known, names))
-    tokens = _numbered(tokens, names)
+    tokens = _named(plain(text), names)
+    tokens = mended(tokens, names.known, partial(_known, names))
+    tokens = _numbered(_all_robots(tokens, len(names.robots)), names)
     tokens = read_points(read_axes(tokens))
-    tokens = _all_robots(tokens)
     tokens = _unknown(tokens, names)
     return [_kind_or_type(tokens, n, names) for n in range(len(tokens))]
 
 
 def _known(names: Names, word: str) -> bool:
     """Whether a word names something as it is, or with a slip."""
-    return word in names.types or _single(word) in names.kinds or _mended(word, names) is not None
+    return word in names.types or single(word) in names.kinds or _mended(word, names) is not None
 
 
 def _named(tokens: Sequence[Token], names: Names) -> list[Token]:
@@ -272,9 +289,7 @@ def _name(
     single = part[0]
     if len(part) == 1 and not single.quoted and _everyday(single, names):
         shouted = single.raw.isupper() and len(single.raw) > 1
-        listed = len(before) > 1 and before[-2].kind == "label" and last in ("and", ",", "&")
-        told_of = bool(told) or listed or (not before and single.text not in _PRONOUNS)
-        if kind == "label" and not shouted and not _is_meant(last, after, told_of):
+        if kind == "label" and not shouted and not _is_label(before, after, names):
             return None
         if kind == "place" and last not in _BEFORE_PLACE | NOUNS["place"]:
             return None
@@ -295,28 +310,29 @@ def _spelled(part: Sequence[Token], letters: str, names: Names) -> Token | None:
 
 _BEFORE_PLACE = {"to", "at", "from", "in", "the", "into", "for", "near", "->", "=>", "around", "by"}
 _VERBS = {"cancel", "prioritize", "raise", "drop", "delete", "lower", "abort", "boost", "expedite"}
-_PRONOUNS = {"he", "she", "it", "we", "they", "you", "i", "there", "this", "that"}
-_AFTER_LABEL = {"is", "are", "has", "have", "goes", "comes", "needs", "must", "should", "will"}
-_AFTER_NO_LABEL = {
-    "done", "first", "finished", "handled", "completed", "the", "a", "last", "next", "served",
-    "executed", "picked", "urgent", "more", "taken", "moved", "delivered", "processed", "there",
-}  # fmt: skip
 
 
-def _is_meant(before: str, after: Sequence[Token], told: bool) -> bool:
-    """Whether an everyday word, as ``be`` in ``cancel be``, is the label of a task."""
-    follows = after[0].text if after else ""
-    if told and before not in NOUNS["label"]:
-        return follows in _AFTER_LABEL
-    return (told or before in _VERBS) and follows not in _AFTER_NO_LABEL
+def _is_label(before: Sequence[Token], after: Sequence[Token], names: Names) -> bool:
+    """Whether an everyday word is the label of a task here."""
+    around = [[_shown(one) for one in some] for some in (before[-3:], after[:3])]
+    others = any(one.kind == "label" for one in before) or any(
+        one.text in names.labels and not _everyday(one, names) for one in after
+    )
+    return names.label(*around) > (0.9 if others else 0.5)
+
+
+def _shown(token: Token) -> str:
+    return token.text if token.kind in ("word", "mark") else f"<{token.kind}>"
 
 
 def _everyday(token: Token, names: Names) -> bool:
-    return token.text in _COMMON or token.text in names.words
+    return token.text in _COMMON or token.text in names.everyday
 
 
 def _digits(token: Token) -> str:
-    """A whole number as digits, so that ``robot one`` is robot1."""
+    """A whole number as digits, so that ``robot one`` is robot1; a dash that is spoken as none."""
+    if token.text in ("dash", "hyphen"):
+        return ""
     if token.kind == "number" and token.value is not None and token.value == int(token.value):
         return str(int(token.value))
     return token.text
@@ -346,7 +362,13 @@ def _numbered(tokens: Sequence[Token], names: Names) -> list[Token]:
         if joins and len(done) > 1 and done[-2].kind in ("robot", "unknown_robot"):
             found = by_number.get(_digits(token), [])
             if len(found) == 1 and "robot" in done[-2].text:
-                done.append(Token("robot", token.text, found[0], token.raw))
+                done.append(Token("robot", f"robot {token.text}", found[0], token.raw))
+                continue
+        if token.kind == "number" and said[-1:] == ["number"] and said[0] not in _NUMBERED:
+            found = by_number.get(_digits(token), [])
+            if len(found) == 1:
+                raw = f"{done[-1].raw} {token.raw}"
+                done[-1] = Token("robot", f"robot {token.text}", found[0], raw)
                 continue
         if token.kind == "word" and (match := re.fullmatch(r"(?:r|bot|unit)(\d+)", token.text)):
             found = by_number.get(match[1], [])
@@ -357,24 +379,30 @@ def _numbered(tokens: Sequence[Token], names: Names) -> list[Token]:
 
 
 _NUMBER = {"number", "no", "nr", "#", "num"}
+_NUMBERED = {"task", "job", "order", "ticket", "room", "phone", "serial", "part", "the", "a"}
+"""What a number may be one of, if not of a robot."""
 
 
-def _all_robots(tokens: Sequence[Token]) -> list[Token]:
+def _all_robots(tokens: Sequence[Token], count: int) -> list[Token]:
     """Replace what names every robot."""
     done = list(tokens)
     at = 0
     while at < len(done):
-        for size in (5, 4, 3, 2, 1):
+        for size in (6, 5, 4, 3, 2, 1):
             part = done[at : at + size]
-            plain = len(part) == size and all(one.kind == "word" for one in part)
-            said = " ".join(one.text for one in part)
+            plain = len(part) == size and all(
+                one.kind in ("word", "number") or one.text == "-" for one in part
+            )
+            digits = [_digits(one) for one in part]
+            said = " ".join("<count>" if one == str(count) else one for one in digits)
             part_of = (
                 said[:4] == "the " and at > 0 and done[at - 1].text in ("from", "of", "to", "in")
             )
             others = at > 0 and done[at - 1].text in _BEFORE_OTHERS
             others = others or (at + size < len(done) and done[at + size].text == "else")
             if plain and not part_of and not others and ALL_ROBOTS.fullmatch(said):
-                done[at : at + size] = [Token("robot", said, "all", said)]
+                raw = " ".join(one.raw for one in part)
+                done[at : at + size] = [Token("robot", raw.casefold(), "all", raw)]
                 break
         at += 1
     return done
@@ -396,7 +424,7 @@ def _unknown(tokens: Sequence[Token], names: Names) -> list[Token]:
 
 
 def _told(token: Token, last: Token | None, after: Sequence[Token], names: Names) -> Token:
-    if token.kind == "number" and last is not None and last.text in NOUNS["label"] - _NOT_LABEL:
+    if token.kind == "number" and last is not None and last.text in ("task", "label"):
         next_ = after[0] if after else None
         if next_ is None or next_.kind != "number":
             label = names.labels.get(_digits(token))
@@ -419,14 +447,11 @@ def _told(token: Token, last: Token | None, after: Sequence[Token], names: Names
         return Token("unknown_place", word, None, token.raw)
     if re.fullmatch(r"(?:robot|bot|unit|agv|amr)[-_]?\w*\d+", word):
         return Token("unknown_robot", word, None, token.raw)
-    if re.fullmatch(r"(?:obstacle|\w{3,})[-_]\d+", word) and _single(word[:-2]) in names.kinds:
+    if re.fullmatch(r"(?:obstacle|\w{3,})[-_]\d+", word) and single(word[:-2]) in names.kinds:
         return Token("unknown_obstacle", word, None, token.raw)
     if before in (NOUNS["label"] | _VERBS) - {"delivery"} and _LABEL.fullmatch(word):
         return Token("unknown_label", word, None, token.raw)
     return token
-
-
-_NOT_LABEL = {"delivery", "request", "transport", "mission", "work", "named", "item"}
 
 
 def _mended(word: str, names: Names) -> tuple[str, str] | None:
@@ -474,9 +499,9 @@ def _kind_or_type(tokens: Sequence[Token], at: int, names: Names) -> Token:
             return token
         return Token("type", word, names.types[word], token.raw)
     if token.kind == "word" and not token.quoted:
-        if _single(word) in names.kinds and before not in ("by", "truck"):
-            return Token("kind", word, names.kinds[_single(word)], token.raw)
-        if len(word) >= 5 and word not in names.words:
+        if single(word) in names.kinds and before not in ("by", "truck"):
+            return Token("kind", word, names.kinds[single(word)], token.raw)
+        if len(word) >= 5 and word not in names.known:
             near = [name for one, name in names.types.items() if slip(word, one)]
             if len(near) == 1:
                 return Token("type", word, near[0], token.raw)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import pairwise
 
 from oath.instruct.offline import questions
 from oath.instruct.offline.gates import is_vague
@@ -70,6 +71,20 @@ def said_priority(line: str) -> set[str]:
         found.add("high")
     return found
 
+
+def asked_priority(heard: Heard, filled: Filled, intent: str) -> str | None:
+    """The priority that an instruction asks for; None if none is."""
+    shares = heard.models.priorities(heard.tokens, intent, said_priority(heard.line))
+    if intent == "change_task_priority":
+        shares = {one: share for one, share in shares.items() if one != "none"}
+    best = max(shares, key=lambda one: shares[one])
+    if (sure := shares[best] / sum(shares.values())) < 0.85:
+        filled.signs.add("priority unsure" if sure > 0.6 else "priority very unsure")
+    return None if best == "none" or sure < UNSURE_PRIORITY else best
+
+
+UNSURE_PRIORITY = 0.5
+"""How probable a priority must be at least to be taken."""
 
 _TYPES_ELSEWHERE = frozenset(
     [
@@ -161,11 +176,8 @@ def read_new_task(heard: Heard, filled: Filled) -> None:
     read_new_label(heard, filled)
     read_type(heard, filled)
     line = heard.line
-    said = said_priority(line)
-    if len(said) == 1:
-        filled.parameters["priority"] = said.pop()
-    elif said:
-        filled.object_to(f"Which priority: {' or '.join(sorted(said))}?")
+    if priority := asked_priority(heard, filled, "add_task"):
+        filled.parameters["priority"] = priority
     robots = [one for one in heard.of("robot", "unknown_robot") if one.value != "all"]
     if robots and not filled.trouble:
         filled.object_to(
@@ -196,7 +208,10 @@ def read_new_label(heard: Heard, filled: Filled) -> None:
         cued = bool(re.match(r"as (its |the |a )?(label|id|name|identifier)\b", after)) or any(
             _NEW_LABEL.match(" ".join(before[k:])) for k in range(len(before))
         )
-        if token.kind == "unknown_label" or (
+        told = token.kind == "unknown_label" and (
+            heard.models.role(heard.tokens, n, "add_task").get("meant", 0.0) > 0.5
+        )
+        if told or (
             cued
             and token.kind in ("word", "label", "place", "robot", "type", "number")
             and token.text not in _NO_LABEL
@@ -204,10 +219,7 @@ def read_new_label(heard: Heard, filled: Filled) -> None:
         ):
             labels.append(token.raw)
         elif token.kind == "label":
-            filled.object_to(
-                f"There is a task {token.value} already. Give the new one another label, or "
-                f"leave it out.",
-            )
+            filled.signs.add("label of another")
     if len(set(labels)) > 1:
         filled.object_to(f"Which label: {' or '.join(labels)}?", "task_label")
     elif not labels and (odd := _unused(heard)):
@@ -223,8 +235,9 @@ def read_new_label(heard: Heard, filled: Filled) -> None:
 
 def _unused(heard: Heard) -> Token | None:
     """A word such as ``q9`` that can only be a label, but is not said to be."""
-    for token in heard.tokens:
-        if token.kind == "word" and re.fullmatch(r"[a-z]{1,4}[-_]?\d{1,4}", token.text):
+    for before, token in pairwise(heard.tokens):
+        like = token.kind == "word" and re.fullmatch(r"[a-z]{1,4}[-_]?\d{1,4}", token.text)
+        if like and before.text in ("add", "new", "create", "task", "job", "order"):
             return token
     return None
 
@@ -258,11 +271,8 @@ def _places(heard: Heard, filled: Filled) -> None:
     for n, token in enumerate(heard.tokens):
         if token.kind in ("point", "place", "unknown_place") and not _names_a_label(filled, token):
             spots.append(n)
-    if len(spots) > 2:
-        different = {str(heard.tokens[n].value) for n in spots}
-        if len(different) > 2:
-            filled.object_to("Which is where it is picked up, and which where it goes?")
-            return
+    if len({str(heard.tokens[n].value) for n in spots}) > 2:
+        filled.signs.add("many places")
     roles = assign_roles(heard, spots)
     if roles is None:
         filled.object_to(
@@ -281,11 +291,12 @@ def _names_a_label(filled: Filled, token: Token) -> bool:
 def read_spot(heard: Heard, filled: Filled, name: str, at: int) -> None:
     """Give a task's location or delivery point the value of the place or point at an index."""
     token, mission = heard.tokens[at], heard.live.scene.mission
-    ask = questions.ask_location if name == "location" else questions.ask_delivery
+    if is_vague(heard.tokens, at):
+        ask = questions.ask_location if name == "location" else questions.ask_delivery
+        filled.signs.add("vague")
+        filled.doubt = (name, f"Where exactly? '{token.raw}' says only roughly. {ask(heard)}")
     if token.kind == "unknown_place":
         filled.object_to(questions.unknown_place(heard, token), name)
-    elif is_vague(heard.tokens, at):
-        filled.object_to(f"Where exactly? '{token.raw}' says only roughly. {ask(heard)}", name)
     elif token.kind == "place" and name == "delivery_point":
         filled.parameters[name] = token.value
     else:
@@ -296,13 +307,18 @@ def read_spot(heard: Heard, filled: Filled, name: str, at: int) -> None:
             filled.parameters[name] = [x, y]
 
 
+def _roles(heard: Heard, at: int) -> dict[str, float]:
+    share = heard.models.role(heard.tokens, at, "add_task")
+    return {one: share.get(one, 0.0) + 1e-9 for one in ("pickup", "delivery", "other")}
+
+
 SURE = 0.65
 """How likely a reading of the places must be to be proposed."""
 
 
 def assign_roles(heard: Heard, spots: Sequence[int]) -> dict[int, str] | None:
     """The most likely roles of places and points, at most one of each; None if that is unsure."""
-    share = [heard.models.roles(heard.tokens, at) for at in spots]
+    share = [_roles(heard, at) for at in spots]
     if not spots:
         return {}
     if len(spots) == 1:

@@ -11,24 +11,44 @@ from oath.errors import did_you_mean
 from oath.instruct.offline import questions
 from oath.instruct.offline.gates import is_vague
 from oath.instruct.offline.heard import Filled, Heard
-from oath.instruct.offline.new_task import read_new_task, said_priority
+from oath.instruct.offline.names import single
+from oath.instruct.offline.new_task import asked_priority, read_new_task
 from oath.instruct.offline.tokens import Token
 from oath.model import Point
 
 
-def fill(intent: str, heard: Heard, priority: str | None = None) -> Filled:
-    """Read the parameters of a command; `priority` is what the wording alone says."""
+def fill(intent: str, heard: Heard) -> Filled:
+    """Read the parameters of a command."""
     filled = Filled()
     _FILL[intent](heard, filled)
     if intent == "change_task_priority":
-        _read_changed_priority(heard, filled, priority)
+        _read_changed_priority(heard, filled)
     return filled
 
 
-def read_task(heard: Heard, filled: Filled) -> None:
+def meant(heard: Heard, filled: Filled, intent: str, kind: str) -> tuple[list[Token], list[Token]]:
+    """The names of one kind that are meant, each value once: known ones and unknown ones."""
+    found: dict[str, Token] = {}
+    unknown: list[Token] = []
+    for at, token in enumerate(heard.tokens):
+        if token.kind.removeprefix("unknown_") != kind:
+            continue
+        share = heard.models.role(heard.tokens, at, intent).get("meant", 0.0)
+        filled.signs.add(f"{kind} {'meant' if share > 0.5 else 'not meant'}")
+        if 0.2 < share < 0.8:
+            filled.signs.add(f"{kind} unsure")
+        if share > 0.5:
+            if token.kind == kind:
+                found.setdefault(str(token.value), token)
+            else:
+                unknown.append(token)
+    return list(found.values()), unknown
+
+
+def read_task(heard: Heard, filled: Filled, intent: str = "change_task_priority") -> None:
     """Read which task is meant, by its label or by where it is."""
-    labels = heard.of("label")
-    if unknown := heard.of("unknown_label"):
+    labels, unknown = meant(heard, filled, intent, "label")
+    if unknown:
         known = questions.open_tasks(heard.live)
         near = did_you_mean(unknown[0].text, known) if known else "no task is open"
         filled.object_to(f"There is no task '{unknown[0].raw}'; {near}", "task_label")
@@ -41,14 +61,18 @@ def read_task(heard: Heard, filled: Filled) -> None:
         filled.object_to(why, "task_label")
     elif not unknown:
         _task_at(heard, filled)
-    if not filled.trouble and re.search(
-        r"\b(all|every|each|both|several|many|some) (of )?(the |my |our )*"
-        r"(tasks|jobs|orders|errands|deliveries|them|task|job)\b(?! else)",
-        re.sub(
-            r"\b(before|after|over|above|ahead of|than|like) (all|every|any)( of)? (the )?\w+",
-            " ",
-            heard.line,
-        ),
+    if (
+        not filled.trouble
+        and not labels
+        and re.search(
+            r"\b(all|every|each|both|several|many|some) (of )?(the |my |our )*"
+            r"(tasks|jobs|orders|errands|deliveries|them|task|job)\b(?! else)",
+            re.sub(
+                r"\b(before|after|over|above|ahead of|than|like) (all|every|any)( of)? (the )?\w+",
+                " ",
+                heard.line,
+            ),
+        )
     ):
         filled.object_to("I change one task at a time. " + questions.ask_label(heard), "task_label")
 
@@ -56,7 +80,7 @@ def read_task(heard: Heard, filled: Filled) -> None:
 def _like_a_label(heard: Heard) -> Token | None:
     """A word that can only be meant as a label."""
     for token in heard.tokens:
-        strange = token.kind == "word" and token.text not in heard.models.words
+        strange = token.kind == "word" and token.text not in heard.models.known
         if strange and re.fullmatch(r"[a-z]{2,3}|[a-z]{1,6}[-_]?\d{1,4}", token.text):
             return token
     return None
@@ -99,56 +123,74 @@ def tasks_at(live: Live, spot: Token) -> list[str]:
     ]
 
 
-def _read_changed_priority(heard: Heard, filled: Filled, meant: str | None) -> None:
-    said = said_priority(heard.line)
-    if any(one.kind == "type" and one.text == "normal" for one in heard.tokens):
-        said.add("normal")
-    if len(said) == 1 and (meant in said or meant is None):
-        filled.parameters["priority"] = said.pop()
-    elif not said and meant is not None:
-        filled.parameters["priority"] = meant
-    else:
+def _read_changed_priority(heard: Heard, filled: Filled) -> None:
+    priority = asked_priority(heard, filled, "change_task_priority")
+    if priority is None:
         filled.object_to("Which priority: low, normal or high?", "priority")
+    else:
+        filled.parameters["priority"] = priority
 
 
 # -- obstacles
 
 
-_THING = re.compile(
-    r"\b(?:a|an|some) (?:big |large |huge |broken |small |long )?([a-z]{3,20}) (?:is|has|was"
-    r"|blocks?"
-    r"|blocking|lying|lies|stands?|standing|sits?|sitting|from|across|between|along|in|on|at"
-    r"|fell)\b"
-)
-"""An obstacle told by a noun that nobody foresaw."""
-
-
 def _obstacle_to_add(heard: Heard, filled: Filled) -> None:
     points: list[Point] = []
-    vague = None
     for n, token in enumerate(heard.tokens):
-        if token.kind == "point":
-            if is_vague(heard.tokens, n):
-                vague = vague or token
-            elif not points or points[-1] != token.value:
-                points.append(token.value)
-    kinds = sorted({str(one.value) for one in heard.of("kind")})
-    if len(kinds) == 1:
-        filled.parameters["obstacle_type"] = kinds[0]
-    elif kinds:
-        filled.object_to(f"Which kind: {' or '.join(kinds)}?", "obstacle_type")
-    elif (noun := _THING.search(heard.line)) and noun[1] not in heard.models.words:
-        filled.parameters["obstacle_type"] = noun[1]
+        if token.kind != "point":
+            continue
+        share = heard.models.role(heard.tokens, n, "obstacle_update").get("meant", 0.0)
+        if 0.2 < share < 0.8:
+            filled.signs.add("point unsure")
+        if share < 0.5:
+            filled.signs.add("point not meant")
+            continue
+        if is_vague(heard.tokens, n):
+            why = f"Where exactly? '{token.raw}' says only roughly. {questions.ask_extent()}"
+            filled.signs.add("vague")
+            filled.doubt = ("obstacle_location", why)
+        if not points or points[-1] != token.value:
+            points.append(token.value)
+    if kind := called(heard, filled):
+        filled.parameters["obstacle_type"] = kind
     if unknown := heard.of("unknown_place"):
         filled.object_to(
             questions.unknown_place(heard, unknown[0]) + " " + questions.ask_extent(),
             "obstacle_location",
         )
-    elif vague is not None:
-        why = f"Where exactly? '{vague.raw}' says only roughly. {questions.ask_extent()}"
-        filled.object_to(why, "obstacle_location")
-        return
     add_points(heard, filled, _corners(heard, points))
+
+
+_NO_NOUN = frozenset({
+    "obstacle", "obstruction", "blockage", "something", "thing", "object", "area", "zone",
+    "region", "space", "stretch", "section", "spot", "way", "path", "passage", "passageway",
+    "aisle", "corridor", "lane", "hall", "hallway", "gangway", "route", "road", "line",
+    "segment", "rectangle", "square", "polygon", "triangle", "block", "hazard", "danger",
+    "mess", "stuff",
+})  # fmt: skip
+"""Nouns that say where or that something is, and not what."""
+
+NOUN, SURE_NOUN = 0.5, 0.8
+"""How likely a noun must be what an obstacle is called to be taken, and not to be doubted."""
+
+
+def called(heard: Heard, filled: Filled) -> str | None:
+    """What an obstacle is called: the likeliest noun, with what goes with it."""
+    shares = heard.models.kinds(heard.tokens)
+    heads = sorted((share.get("noun", 0.0), n) for n, share in enumerate(shares))
+    if not heads or heads[-1][0] < NOUN:
+        return None
+    best, end = heads[-1]
+    if best < SURE_NOUN:
+        filled.signs.add("kind unsure")
+    start = end
+    while start > 0 and shares[start - 1].get("with", 0.0) > 0.4:
+        start -= 1
+    words = [one.raw.casefold() for one in heard.tokens[start : end + 1]]
+    last = heard.tokens[end]
+    if single(last.text) in _NO_NOUN:
+        return None
+    return " ".join([*words[:-1], str(last.value) if last.kind == "kind" else single(words[-1])])
 
 
 _BOX = re.compile(
@@ -183,14 +225,14 @@ def add_points(heard: Heard, filled: Filled, points: Sequence[Point]) -> None:
 
 def _obstacle_to_remove(heard: Heard, filled: Filled) -> None:
     known = heard.live.state.obstacles
-    named = heard.of("obstacle")
+    named, unknown = meant(heard, filled, "remove_obstacle", "obstacle")
     if len(named) == 1:
         filled.parameters["obstacle"] = named[0].value
         return
     if named:
         filled.several = [str(one.value) for one in named]
         return
-    if unknown := heard.of("unknown_obstacle"):
+    if unknown:
         filled.object_to(
             f"There is no obstacle '{unknown[0].raw}'. {questions.ask_obstacle(heard)}", "obstacle"
         )
@@ -221,15 +263,17 @@ def _touches(polygon: Sequence[Point], at: Point) -> bool:
 # -- robots
 
 
-def _robot(heard: Heard, filled: Filled) -> None:
-    robots = heard.of("robot")
-    if unknown := heard.of("unknown_robot"):
+def _robot(heard: Heard, filled: Filled, intent: str) -> None:
+    robots, unknown = meant(heard, filled, intent, "robot")
+    if unknown:
         known = ", ".join(heard.live.state.robots)
         filled.object_to(f"There is no robot '{unknown[0].raw}'. Known: {known}.", "robot")
     elif len(robots) == 1:
         filled.parameters["robot"] = robots[0].value
     elif any(one.value == "all" for one in robots):
         filled.object_to("All robots, or some? " + questions.ask_robot(heard), "robot")
+    elif len(robots) == len(heard.live.state.robots) > 2:
+        filled.parameters["robot"] = "all"
     elif robots:
         filled.several = [str(one.value) for one in robots]
     elif len(heard.live.state.robots) == 1 and re.search(r"\bthe robot\b", heard.line):
@@ -247,13 +291,21 @@ def _paused_robot(heard: Heard, filled: Filled) -> None:
     if not heard.of("robot", "unknown_robot") and _EMERGENCY.search(heard.line):
         filled.parameters["robot"] = "all"
     else:
-        _robot(heard, filled)
+        _robot(heard, filled, "pause_robot")
+
+
+def _resumed_robot(heard: Heard, filled: Filled) -> None:
+    _robot(heard, filled, "resume_robot")
 
 
 def _failed_robot(heard: Heard, filled: Filled) -> None:
-    _robot(heard, filled)
+    _robot(heard, filled, "robot_failed")
     if filled.parameters.get("robot") == "all":
         filled.object_to("Which robot failed? " + questions.ask_robot(heard), "robot")
+
+
+def _cancelled_task(heard: Heard, filled: Filled) -> None:
+    read_task(heard, filled, "cancel_task")
 
 
 def _nothing(heard: Heard, filled: Filled) -> None:
@@ -264,10 +316,10 @@ _FILL: Mapping[str, Callable[[Heard, Filled], None]] = {
     "add_task": read_new_task,
     "obstacle_update": _obstacle_to_add,
     "change_task_priority": read_task,
-    "cancel_task": read_task,
+    "cancel_task": _cancelled_task,
     "remove_obstacle": _obstacle_to_remove,
     "pause_robot": _paused_robot,
-    "resume_robot": _robot,
+    "resume_robot": _resumed_robot,
     "robot_failed": _failed_robot,
     "query_status": _nothing,
     "undo": _nothing,

@@ -5,9 +5,8 @@ from __future__ import annotations
 import string
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import cache, lru_cache
+from functools import lru_cache
 
-from oath.instruct.offline import clear, gates
 from oath.instruct.offline.tokens import Token
 
 ALPHABET = {
@@ -76,16 +75,10 @@ def mended(
 def _mended(token: Token, words: frozenset[str]) -> Token:
     if token.kind != "word" or token.quoted or token.text in words or token.text in ALPHABET:
         return token
-    if token.text in guarding() or (token.raw.isupper() and len(token.raw) < 4):
+    if token.raw.isupper() and len(token.raw) < 4:
         return token
     word = nearest(token.text, words)
     return token if word is None else replace(token, text=word)
-
-
-@cache
-def guarding() -> frozenset[str]:
-    """Words that are right as they are, for a gate looks for them."""
-    return gates.guarding() | clear.guarding()
 
 
 @lru_cache(maxsize=4096)

@@ -72,7 +72,7 @@ _JOINED = {
     "prioritised": "prioritized", "canceled": "cancelled", "cancelation": "cancellation",
     "metres": "meters", "metre": "meter", "obs": "obstacle", "dropoff": "drop-off",
     "pickup": "pick-up", "w/": "with", "aint": "is not", "havent": "have not",
-    "ya": "you", "ur": "your",
+    "ya": "you", "ur": "your", "easting": "x", "northing": "y",
 }  # fmt: skip
 _SHORT = {"ll": "will", "re": "are", "ve": "have", "d": "would", "m": "am"}
 _IS = {"there", "it", "that", "here", "what", "where", "how", "who", "he", "she", "this", "when"}
@@ -263,7 +263,8 @@ _PARTS = {
 
 _COUNTED = {"robot", "bot", "unit", "vehicle", "machine", "agv", "amr", "cart"}
 _NUMBER = {"number", "no", "nr", "#", "num"}
-_BESIDE_NUMBER = {"x", "y", "robot", "bot", "unit", "at", "minus", "task", "="}
+_BESIDE_NUMBER = {"x", "y", "robot", "robots", "bot", "unit", "at", "minus", "task", "=", "dash",
+                  "hyphen"}  # fmt: skip
 
 
 def _not_one(tokens: Sequence[Token], at: int) -> Token:
@@ -334,6 +335,9 @@ def _points(tokens: Sequence[Token], at: int, before: Token | None) -> tuple[lis
             inside += 1
         body = tokens[at + 1 : inside]
         if inside < len(tokens) and body and not any(one.text in _CLOSE for one in body):
+            if sum(one.kind == "number" for one in body) > 2:
+                found, end = _run(body, 0, None) if body[0].kind == "number" else ([], 0)
+                return (found, inside + 1) if found and end == len(body) else ([], at + 1)
             values = [one.value for one in body if one.kind == "number"]
             rest = {one.text for one in body if one.kind != "number"}
             if values and rest <= _BETWEEN | _METERS | _EQUALS | {"x", "y"}:
@@ -377,11 +381,14 @@ def _by_axes(tokens: Sequence[Token], at: int) -> tuple[list[Token], int]:
 
 def _run(tokens: Sequence[Token], at: int, before: Token | None) -> tuple[list[Token], int]:
     """Read numbers in a row as pairs, if their number and what separates them allow it."""
-    told = before is not None and (
-        before.text in _BEFORE_LOOSE
-        or (
-            before.text in ("from", "to")
-            and [one.text for one in tokens[at + 1 : at + 2]] == ["by"]
+    told = _all_by(tokens) or (
+        before is not None
+        and (
+            before.text in _BEFORE_LOOSE
+            or (
+                before.text in ("from", "to")
+                and [one.text for one in tokens[at + 1 : at + 2]] == ["by"]
+            )
         )
     )
     if told and (found := _loose(tokens, at)):
@@ -408,8 +415,9 @@ def _run(tokens: Sequence[Token], at: int, before: Token | None) -> tuple[list[T
         and all(one.raw.replace(" ", "").isalpha() for one in numbers)
         and within == {""}
     )
+    ends = before is not None and before.text == "between" and gaps == ["", "and", ""]
     usable = (
-        not (spoken and set(gaps) != {""})  # as "one two, one nine": digits or numbers?
+        not (spoken and set(gaps) != {""} and not ends)  # "one two, one nine": digits or numbers?
         and len(numbers) % 2 == 0
         and len(within) == 1
         and all(one.value is not None for one in numbers)
@@ -419,6 +427,13 @@ def _run(tokens: Sequence[Token], at: int, before: Token | None) -> tuple[list[T
         return [], end
     pairs = zip(numbers[::2], numbers[1::2], strict=True)
     return [point_token((a.value, b.value)) for a, b in pairs], end
+
+
+def _all_by(tokens: Sequence[Token]) -> bool:
+    """Whether every number stands in a pair such as ``4 by 7.5``."""
+    at = [n for n, one in enumerate(tokens) if one.kind == "number"]
+    pairs = list(zip(at[::2], at[1::2], strict=False))
+    return len(at) % 2 == 0 and all(b == a + 2 and tokens[a + 1].text == "by" for a, b in pairs)
 
 
 def _loose(tokens: Sequence[Token], at: int) -> list[Token]:

@@ -2,44 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 from pydantic import ValidationError
 
 from oath.commands import COMMANDS, Command
 from oath.instruct import Reply
-from oath.instruct.offline import clear, gates, questions, slots, unheard
+from oath.instruct.offline import gates, questions, slots
 from oath.instruct.offline.heard import Filled, Heard
-from oath.instruct.offline.names import NOUNS
-from oath.instruct.offline.spelling import guarding
+from oath.instruct.offline.new_task import asked_priority
 from oath.instruct.offline.tokens import Token
 
-_ROOMY = ("add_task", "obstacle_update", "query_status")
-"""Intents told with many words that do not matter, such as what is carried."""
+CLEAR = 0.8
+"""How probably clear an instruction must be to be acted on, if it is no order in plain words."""
 
-_MANNERS = {
-    "oh", "uh", "um", "er", "eh", "ah", "hmm", "huh", "yo", "both", "guys", "folks", "mate",
-    "ta", "thx", "thnx", "ty", "tysm", "tks", "fr", "frfr", "ngl", "tbh", "lol", "lmao", "nvm",
-    "omg", "bruh", "bro", "kk", "imo", "imho", "rn", "atm", "smh", "btw", "fyi", "aye", "och",
-    "wee", "lad", "lads", "lassie", "poor", "dear", "bloody", "damn", "damned", "darn",
-    "bleeding", "ruddy", "flipping", "freaking", "frigging", "stupid", "silly", "wretched",
-    "pesky", "trusty", "faithful", "chaps", "gents", "chap", "fellas", "peeps", "yall", "lovely",
-    "cheers", "sadly", "unfortunately", "alas", "luckily", "thankfully", "fortunately",
-    "regrettably", "clearly", "obviously", "indeed", "literally", "simply", "kindly", "blasted",
-    "blooming", "lousy", "rotten", "goddamn", "innit", "ye", "yer", "thee", "mon", "amigo",
-    "amigos", "hombre", "cap'n", "skipper", "sarge", "guv", "gaffer", "squire", "milord",
-    "ladies", "gentlemen", "team", "crew", "y'all",
-}  # fmt: skip
-"""Words that change nothing, wherever they stand."""
-
-LIKELY = 0.6
-"""How probable an intent must be to be acted on."""
-
-SURE_PRIORITY = 0.8
-"""How probable a change of priority must be for its wording alone to say which."""
+LONGEST, SURE = 12, 0.9
+"""Tokens of an order in plain words at most, and how sure its intent must be."""
 
 ABOUT = {
     "add_task": "add a task",
@@ -72,7 +52,6 @@ class Meant:
     """The intent of words: the most probable one that acts, and how sure that is."""
 
     intent: str
-    priority: str | None
     share: float
     second: str
     other: float
@@ -80,18 +59,10 @@ class Meant:
 
 def meaning(heard: Heard) -> Meant:
     """What the trained model makes of an instruction."""
-    shares: dict[str, float] = {}
-    priorities: dict[str, float] = {}
-    for name, share in heard.models.intents(heard.tokens).items():
-        intent, _, priority = name.partition(":")
-        shares[intent] = shares.get(intent, 0.0) + share
-        if priority:
-            priorities[priority] = share
+    shares = heard.models.intents(heard.tokens)
     other = shares.pop("other", 0.0)
     ranked = sorted(shares, key=lambda one: -shares[one])
-    priority = max(priorities, key=lambda one: priorities[one])
-    sure = priorities[priority] >= 0.75 * sum(priorities.values())
-    return Meant(ranked[0], priority if sure else None, shares[ranked[0]], ranked[1], other)
+    return Meant(ranked[0], shares[ranked[0]], ranked[1], other)
 
 
 def understand(heard: Heard) -> Reply:
@@ -104,8 +75,6 @@ def understand(heard: Heard) -> Reply:
     parts = commands_of(heard)
     if len(parts) == 1:
         return _one(parts[0])
-    if why := gates.conditional(heard.line):
-        return Reply(status="clarification", message=f"{why} Say it plainly if it is meant.")
     return _several(parts)
 
 
@@ -123,83 +92,122 @@ def nothing(heard: Heard) -> Reply:
 def _one(heard: Heard) -> Reply:
     """One command, or a question about it."""
     meant = meaning(heard)
-    if meant.other > max(meant.share, 0.4) or meant.share < 0.2:
+    if meant.other > max(meant.share, 0.7) or meant.share < 0.2:
         return nothing(heard)
-    denied = gates.not_meant(heard.line, meant.intent)
-    if denied is not None:
-        kept = None if "not to do" in denied else meant.intent
-        say = f"{denied} Say it plainly if I shall {ABOUT[meant.intent]}."
-        return Reply(status="clarification", intent=kept, message=say)
-    if why := clear.unclear(heard.line, meant.intent):
-        say = f"{why} Say it plainly if I shall {ABOUT[meant.intent]}."
-        return Reply(status="clarification", intent=meant.intent, message=say)
-    if why := _in_one(heard, meant.intent):
-        return Reply(status="clarification", intent=meant.intent, message=why)
-    odd = len(unheard.strange(heard.tokens, heard.models.words)[0])
-    foreign = meant.intent not in _ROOMY and unheard.foreign(
-        heard.tokens,
-        heard.models.words | guarding() | NOUNS["robot"] | _MANNERS,
-        lambda clause: clear.means(clause, meant.intent),
+    filled = slots.fill(meant.intent, heard)
+    reply = answer(heard, meant.intent, filled)
+    if reply.status != "complete":
+        return reply
+    plain = meant.intent == "pause_robot" and _is_plain(heard)
+    if plain or is_clear(heard, meant, filled):
+        return replace(reply, plain=plain)
+    if filled.doubt is not None:
+        filled.object_to(filled.doubt[1], filled.doubt[0])
+        return answer(heard, meant.intent, filled)
+    why = gates.reason(heard.tokens, heard.models.concepts) or "I am not sure of that."
+    return Reply(
+        status="clarification",
+        intent=meant.intent,
+        parameters=reply.parameters,
+        message=f"{why} Say it plainly if I shall {ABOUT[meant.intent]}.",
     )
-    if foreign:
-        say = (
-            f"I do not know the word '{foreign}'. Say it plainly if I shall {ABOUT[meant.intent]}."
-        )
-        return Reply(status="clarification", intent=meant.intent, message=say)
-    doubt = meant.share < LIKELY + 0.1 * odd or gates.speaks_against(heard.line, meant.intent)
-    if doubt:
-        return Reply(
-            status="clarification",
-            intent=meant.intent,
-            message=f"Shall I {ABOUT[meant.intent]} or {ABOUT[meant.second]}? Say it differently.",
-        )
-    told = meant.priority if meant.share >= SURE_PRIORITY else None
-    filled = slots.fill(meant.intent, heard, told)
-    if meant.intent == "add_task" and "priority" not in filled.parameters:
-        _read_its_priority(heard, filled)
-    return answer(heard, meant.intent, filled, sure=meant.share)
 
 
-def _asides(heard: Heard) -> Iterator[Meant]:
-    """What pieces mean that speak of *it* only, as ``then raise its priority``."""
-    for piece in _pieces(heard.tokens)[1:]:
-        words = {one.text for one in piece}
-        if words & {"it", "its", "him", "that"} and all(
-            one.kind in ("word", "mark") for one in piece
-        ):
-            meant = meaning(replace(heard, tokens=tuple(piece)))
-            if meant.share > 0.6:
-                yield meant
+_PLAIN = frozenset({
+    "stop", "pause", "halt", "hold", "freeze", "wait", "stand", "still", "stay", "where", "you",
+    "are", "it", "put", "on", "position", "now", "please", "robot", "robots", "immediately",
+    "at", "once", "right", "away", "emergency",
+})  # fmt: skip
+"""Words of a pause that says nothing else."""
 
 
-def _in_one(heard: Heard, intent: str) -> str | None:
-    """Why an instruction that says two things of one is not clear."""
-    alike = {intent, "add_task", "change_task_priority" if intent == "add_task" else intent}
-    for meant in _asides(heard):
-        if meant.intent not in alike and (meant.share > 0.8 or intent == "add_task"):
-            return f"Shall I {ABOUT[intent]} or {ABOUT[meant.intent]}? One after the other, please."
-    return None
+def _is_plain(heard: Heard) -> bool:
+    return all(
+        one.kind == "robot" or (one.text in _PLAIN if one.kind == "word" else one.text in ",.!")
+        for one in heard.tokens
+    )
 
 
-def _read_its_priority(heard: Heard, filled: Filled) -> None:
-    for meant in _asides(heard):
-        if meant.intent == "change_task_priority":
-            if meant.priority is None:
-                filled.object_to("Which priority: low, normal or high?", "priority")
-            else:
-                filled.parameters["priority"] = meant.priority
+def is_clear(heard: Heard, meant: Meant, filled: Filled) -> bool:
+    """Whether an instruction is to be acted on as it was understood."""
+    if gates.forbids(heard.line, meant.intent):
+        return False
+    if meant.share > SURE and _is_plain_order(heard, meant.intent):
+        return True
+    return heard.models.clarity(heard.tokens, meant.intent, signs(heard, meant, filled)) > CLEAR
 
 
-def answer(heard: Heard, intent: str, filled: Filled, sure: float = 1.0) -> Reply:
-    """A proposal if all is clear, else the question that comes first."""
+_ORDERS: Mapping[str, frozenset[str]] = {
+    "add_task": frozenset({"point", "place", "type", "kind"}),
+    "change_task_priority": frozenset({"label", "point", "place", "type"}),
+    "cancel_task": frozenset({"label", "point", "place", "type"}),
+    "pause_robot": frozenset({"robot"}),
+    "resume_robot": frozenset({"robot"}),
+    "undo": frozenset(),
+}
+"""Intents that are orders, and what they may name."""
+
+_ASK = frozenset({
+    "is", "are", "am", "was", "does", "did", "has", "have", "do", "who", "what", "why", "which",
+    "how", "should", "shall",
+})  # fmt: skip
+"""Words with which a question begins."""
+
+_NOT_PLAIN = frozenset({
+    "never", "not", "no", "nobody", "did", "does", "was", "were", "had", "would", "should",
+    "could", "might", "may", "must", "if", "when", "while", "once", "said", "says", "told", "think",
+    "thinks", "almost", "nearly", "hardly", "ever", "tomorrow", "yesterday", "ago", "already",
+    "used", "moment", "there", "soon", "later", "everything", "what", "it", "them", "stops",
+    "stopped", "waits", "waited", "pauses", "paused", "keeps", "others",
+})  # fmt: skip
+"""Words with which an order may be none, or not a plain one."""
+
+
+def _is_plain_order(heard: Heard, intent: str) -> bool:
+    """Whether an instruction is a short order in words of the templates that raise no doubt."""
+    trained = heard.models
+    words = [one.text for one in heard.tokens if one.kind == "word"]
+    named = {one.kind for one in heard.tokens} - {"word", "mark"}
+    return (
+        intent in _ORDERS
+        and named <= _ORDERS[intent]
+        and len(heard.tokens) <= LONGEST
+        and all(one in trained.everyday and one not in _NOT_PLAIN for one in words)
+        and heard.tokens[0].text not in _ASK
+        and all(one.text != "?" for one in heard.tokens)
+        and gates.reason(heard.tokens, trained.concepts) is None
+    )
+
+
+def signs(heard: Heard, meant: Meant, filled: Filled) -> set[str]:
+    """What may make an instruction unclear, besides its words."""
+    found = {f"!{one}" for one in filled.signs}
+    found |= {f"!sure {step}" for step in (0.5, 0.7, 0.85, 0.95, 0.99) if meant.share < step}
+    if meant.other > 0.1:
+        found.add("!other")
+    numbers = sum(one.kind == "number" for one in heard.tokens)
+    strange = sum(
+        one.kind == "word" and one.text.isalpha() and one.text not in heard.models.known
+        for one in heard.tokens
+    )
+    found |= {f"!numbers {n}" for n in range(1, min(numbers, 3) + 1)}
+    found |= {f"!strange {n}" for n in range(1, min(strange, 4) + 1)}
+    if any(one.quoted for one in heard.tokens):
+        found.add("!quoted")
+    return found
+
+
+def answer(heard: Heard, intent: str, filled: Filled) -> Reply:
+    """A proposal if all is known, else the question that comes first."""
     shown = dict(filled.parameters)
     asked = tuple(filled.missing)
-    unclear = filled.trouble or gates.doubtful(heard.line, intent)
-    if filled.trouble or (unclear and not asked):
-        rest = [one for one in asked if not filled.trouble]
-        say = " ".join(filter(None, (unclear, questions.ask(heard, rest))))
+    if filled.trouble:
         return Reply(
-            status="clarification", intent=intent, parameters=shown, missing=asked, message=say
+            status="clarification",
+            intent=intent,
+            parameters=shown,
+            missing=asked,
+            message=filled.trouble,
         )
     if asked:
         return Reply(
@@ -209,8 +217,6 @@ def answer(heard: Heard, intent: str, filled: Filled, sure: float = 1.0) -> Repl
             missing=asked,
             message=_so_far(heard, intent, filled) + questions.ask(heard, asked),
         )
-    if left := leftover(heard, intent):
-        return Reply(status="clarification", intent=intent, parameters=shown, message=left)
     try:
         commands = _commands(intent, filled)
     except ValidationError as error:
@@ -252,29 +258,6 @@ def _commands(intent: str, filled: Filled) -> tuple[Command, ...]:
         one for one in ("task_label", "robot", "obstacle") if one in COMMANDS[intent].model_fields
     )
     return tuple(make({**filled.parameters, name: one}) for one in filled.several)
-
-
-def leftover(heard: Heard, intent: str) -> str | None:
-    """What of an instruction no parameter has taken up, as a question."""
-    points = sum(one.kind == "point" for one in heard.tokens)
-    counted = {
-        n
-        for n, (one, behind) in enumerate(pairwise(heard.tokens))
-        if one.value == points and behind.text in ("corners", "points", "vertices", "corner")
-    }
-    numbers = [
-        one for n, one in enumerate(heard.tokens) if one.kind == "number" and n not in counted
-    ]
-    if numbers and intent not in ("query_status", "undo"):
-        return (
-            f"What is '{numbers[0].raw}'? I take points as pairs in metres, e.g. (5, 19.5); say it "
-            "without other numbers."
-        )
-    odd, plain = unheard.strange(heard.tokens, heard.models.words)
-    if len(odd) >= 3 or (len(odd) == 2 and plain <= 4):
-        shown = ", ".join(repr(one) for one in odd[:4])
-        return f"I do not know the words {shown}. Say it differently."
-    return None
 
 
 # -- several commands in one sentence
@@ -323,15 +306,17 @@ def _begins(heard: Heard, before: Sequence[Token], piece: Sequence[Token]) -> bo
         return False
     while piece and piece[0].text in _LINKS:
         piece = piece[1:]
-    first, second = (meaning(replace(heard, tokens=tuple(one))) for one in (before, piece))
-    if second.share < 0.75 or first.share < 0.6:
+    parts = [replace(heard, tokens=tuple(one)) for one in (before, piece)]
+    first, second = map(meaning, parts)
+    if second.share < (0.75 if second.intent in NEEDS else 0.95) or first.share < 0.6:
         return False
     if not (_stands(first.intent, before) and _stands(second.intent, piece)):
         return False
     if first.intent != second.intent:
         return True
     if first.intent == "change_task_priority":
-        return None not in (first.priority, second.priority) and first.priority != second.priority
+        asked = [asked_priority(one, Filled(), first.intent) for one in parts]
+        return None not in asked and asked[0] != asked[1]
     return first.intent == "add_task" and _whole(before) and _whole(piece)
 
 
@@ -361,4 +346,5 @@ def _several(parts: Sequence[Heard]) -> Reply:
             )
             return replace(reply, status="clarification", message=say)
     commands = tuple(command for reply in replies for command in reply.commands)
-    return replace(replies[0], commands=commands, message="Shall I do all of this?")
+    plain = all(reply.plain for reply in replies if reply.intent == "pause_robot")
+    return replace(replies[0], commands=commands, message="Shall I do all of this?", plain=plain)

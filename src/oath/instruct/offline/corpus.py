@@ -1,4 +1,10 @@
-"""Makes utterances of the training text: choices are drawn, slots filled from sample worlds."""
+"""What the models are trained on: what people said, and templates.
+
+``said.csv`` holds utterances in families, each with what it means in the paper's maze, in the form
+of `oath.bench.utterances`; ``asides.csv`` what people say around an instruction, which is harmless,
+or holds it back; ``training.txt`` templates, whose choices are drawn and slots filled from sample
+worlds; ``lexicon.txt`` words and phrases by what they do in an instruction.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +14,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 
-from oath.instruct.offline.model import stem
-from oath.instruct.offline.names import KINDS, Names, key, tag
+from oath.instruct.offline.features import Concepts, stem
+from oath.instruct.offline.names import KINDS, Names, key, plain, tag
 from oath.instruct.offline.tokens import Token, clean, lex
 
 SOURCE = "training.txt"
+LEXICON = "lexicon.txt"
 
 GATED = "gated"
 """The class of utterances that the models do not learn."""
@@ -34,8 +41,8 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
-class Utterance:
-    """Something an operator may say; `roles` are those of its places and points, by index."""
+class Drawn:
+    """An utterance drawn of a template; `roles` are those of its places and points, by index."""
 
     line: Line
     text: str
@@ -62,17 +69,29 @@ def lines() -> tuple[list[Line], dict[str, str]]:
     return found, macros
 
 
-def concepts(macros: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
-    """For each word that is a choice of its own in named sets of choices, which sets these are."""
-    found: dict[str, tuple[str, ...]] = {}
-    for name, choices in macros.items():
-        for word in {stem(one) for one in choices.split("|") if one.isalpha()}:
-            found[word] = (*found.get(word, ()), f"@{name.lower()}")
-    return found
+def lexicon() -> dict[str, list[str]]:
+    """Words and phrases by what they do in an instruction."""
+    text = files("oath.instruct.offline").joinpath(LEXICON).read_text(encoding="utf-8")
+    rows = [row.partition(":") for row in text.splitlines() if row and row[0] != "#"]
+    return {name: [one.strip() for one in entries.split(",")] for name, _, entries in rows}
 
 
-def vocabulary(rows: list[Line], macros: Mapping[str, str]) -> frozenset[str]:
-    """Every word that a line of an operator's can be made of."""
+def concepts(macros: Mapping[str, str]) -> Concepts:
+    """The words and phrases of named sets of choices, and of the lexicon."""
+    sets = {name: choices.split("|") for name, choices in macros.items()}
+    sets |= {f"{name}_": entries for name, entries in lexicon().items()}
+    found: dict[str, set[tuple[tuple[str, ...], str]]] = {}
+    for name, choices in sets.items():
+        for choice in choices:
+            words = [one.text for one in plain(choice)]
+            if words and re.fullmatch(r"[\w' -]+", choice.strip()):
+                phrase = tuple(stem(one) if one.isalpha() else one for one in words)
+                found.setdefault(phrase[0], set()).add((phrase, f"@{name.lower()}"))
+    return {first: tuple(sorted(some)) for first, some in sorted(found.items())}
+
+
+def everyday(rows: list[Line], macros: Mapping[str, str]) -> frozenset[str]:
+    """Every word that a template can be made of."""
     plain = [row.pattern for row in rows if row.family.split("/")[1] not in _FOREIGN]
     words: set[str] = set()
     for pattern in (*plain, *macros.values()):
@@ -82,16 +101,16 @@ def vocabulary(rows: list[Line], macros: Mapping[str, str]) -> frozenset[str]:
     return frozenset(word for word in words if len(word) > 1 or word in ("a", "i"))
 
 
-def utterances(seed: int = 0, each: int = 14, world: Names | None = None) -> Iterator[Utterance]:
+def drawn(seed: int = 0, each: int = 5, world: Names | None = None) -> Iterator[Drawn]:
     """Draw up to `each` utterances of every line, in sample worlds or in one."""
     rows, macros = lines()
-    words = vocabulary(rows, macros)
+    words = everyday(rows, macros)
     worlds = [world] if world is not None else [_world(names, words) for names in _WORLDS]
     rng = random.Random(seed)
     for row in rows:
         seen = set()
         for _ in range(each):
-            pattern = _drawn(row.pattern, macros, rng)
+            pattern = _choice(row.pattern, macros, rng)
             there = rng.choice(worlds)
             if pattern in seen:
                 continue
@@ -99,14 +118,14 @@ def utterances(seed: int = 0, each: int = 14, world: Names | None = None) -> Ite
             yield _filled(row, pattern, there, rng)
 
 
-def _drawn(pattern: str, macros: Mapping[str, str], rng: random.Random) -> str:
+def _choice(pattern: str, macros: Mapping[str, str], rng: random.Random) -> str:
     """Draw one of each choice, the innermost first."""
     for _ in range(50):
         pattern = _OPEN.sub(lambda match: f"[{macros[match[1]]}]", pattern)
-        drawn = re.sub(r"\[([^\[\]]*)\]", lambda m: rng.choice(m[1].split("|")), pattern)
-        if drawn == pattern:
+        chosen = re.sub(r"\[([^\[\]]*)\]", lambda m: rng.choice(m[1].split("|")), pattern)
+        if chosen == pattern:
             break
-        pattern = drawn
+        pattern = chosen
     return " ".join(pattern.replace(" ,", ",").split())
 
 
@@ -143,7 +162,7 @@ def _world(names: Sequence[tuple[str, ...]], words: frozenset[str]) -> Names:
     return Names(places, robots, labels, obstacles, kinds, types, words)
 
 
-def _filled(row: Line, pattern: str, world: Names, rng: random.Random) -> Utterance:
+def _filled(row: Line, pattern: str, world: Names, rng: random.Random) -> Drawn:
     """Fill the slots of a drawn line; note what its places and points are for."""
     text = _SLOT.sub(lambda match: _value(match[1], world, rng), pattern)
     if rng.random() < 0.3:
@@ -156,7 +175,7 @@ def _filled(row: Line, pattern: str, world: Names, rng: random.Random) -> Uttera
     roles: tuple[tuple[int, str], ...] = ()
     if len(asked) == len(spots) and row.intent == "add_task":
         roles = tuple((n, _ROLES[slot]) for n, slot in zip(spots, asked, strict=True))
-    return Utterance(row, text, tokens, roles)
+    return Drawn(row, text, tokens, roles)
 
 
 _ROLES = {"pickup": "pickup", "delivery": "delivery", "place": "other", "point": "other"}
