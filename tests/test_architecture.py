@@ -28,6 +28,7 @@ ROWS = (
     ("instruct", "preview"),
     ("runtime",),
     ("", "bench"),
+    ("training",),
     ("service",),
     ("cli",),
 )

@@ -458,3 +458,11 @@ def test_a_priority_that_was_never_said_is_asked_for() -> None:
     draft = Draft(intent="change_task_priority")
     reply = Offline().interpret(Dialogue(said=("one of them", "cc"), draft=draft), live())
     assert reply.missing == ("priority",)
+
+
+@pytest.mark.parametrize(
+    "words", ["forget it, somebody has done it", "Scratch that, he walks over himself."]
+)
+def test_a_draft_is_dropped_in_more_words(words: str) -> None:
+    reply = say("add a task at (5, 17)", words)
+    assert (reply.status, reply.intent) == ("clarification", None)

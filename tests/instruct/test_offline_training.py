@@ -13,11 +13,12 @@ from oath.bench.utterances import dialogues, heldout, validation, world
 from oath.commands import COMMANDS, Live, admit
 from oath.instruct import Dialogue
 from oath.instruct.offline import Offline
-from oath.instruct.offline.corpus import GATED, concepts, drawn, lines
 from oath.instruct.offline.model import NAMES, models
 from oath.instruct.offline.names import Names
-from oath.instruct.offline.train import asides, corrected, digest, fit, said, understanding
-from oath.instruct.offline.train import worlds as both_worlds
+from oath.training.said import asides, corrected, said
+from oath.training.said import worlds as both_worlds
+from oath.training.templates import GATED, concepts, drawn, lines
+from oath.training.train import digest, fit, understanding
 
 
 @cache
@@ -52,7 +53,7 @@ def test_there_is_much_to_learn_from() -> None:
 
 
 def test_the_weights_are_made_of_the_data_that_lies_beside_them() -> None:
-    assert models().data == digest(), "run python -m oath.instruct.offline.train"
+    assert models().data == digest(), "run python -m oath.training"
 
 
 def test_training_twice_gives_the_same() -> None:

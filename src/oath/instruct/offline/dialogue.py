@@ -11,6 +11,7 @@ from oath.commands import COMMANDS
 from oath.errors import did_you_mean
 from oath.instruct import Draft, Reply
 from oath.instruct.offline import gates, new_task, questions, slots
+from oath.instruct.offline.features import classes
 from oath.instruct.offline.gates import as_line
 from oath.instruct.offline.heard import Filled, Heard
 from oath.instruct.offline.tokens import Token
@@ -23,7 +24,7 @@ _DROP = re.compile(
     r"|about that)|drop (?:it|that)|scrap (?:it|that)|leave it|skip it|cancel (?:it|that|this)"
     r"|abort|stop asking|"
     r"no thanks?|no thank you|nothing|not needed|let it be|do not bother|i changed my mind"
-    r"|discard (?:it|that)"
+    r"|discard (?:it|that)|scratch (?:it|that)|strike that|false alarm"
     r"|no|nope|cancel|dismiss|ignore (?:it|that))(?: (?:please|then|anymore|again|now|after all"
     r"|thanks|it is (still )?(there|needed|here)( after all)?|i was (wrong|mistaken)"
     r"|my mistake|leave it( as it (is|was))?|leave (things|everything)"
@@ -44,7 +45,7 @@ def follow_up(heard: Heard, draft: Draft) -> Reply:
     """Interpret words in the light of an open question or proposal."""
     if why := gates.refused(heard.line):
         return Reply(status="clarification", message=why)
-    if _DROP.match(heard.line.strip()):
+    if _DROP.match(heard.line.strip()) or _takes_back(heard):
         return Reply(status="clarification", message="Dropped; nothing is changed.")
     heard = replace(heard, tokens=tuple(_by_number(heard, draft)))
     if _anew(heard, draft):
@@ -63,6 +64,18 @@ def follow_up(heard: Heard, draft: Draft) -> Reply:
     if why := gates.reason(heard.tokens, heard.models.concepts, gates.IN_ANSWERS):
         filled.object_to(f"{why} Say it plainly if that is meant.")
     return answer(heard, draft.intent, filled)
+
+
+def _takes_back(heard: Heard) -> bool:
+    """Whether words take back what was said, and name nothing else."""
+    if any(one.kind not in ("word", "mark") for one in heard.tokens):
+        return False
+    ends = [n for n, one in enumerate(heard.tokens) if one.kind == "mark" and one.text in ",.;!-"]
+    first = heard.tokens[: ends[0]] if ends else heard.tokens
+    if len(first) > 1 and _DROP.match(as_line(first)):
+        return True
+    said = classes(heard.tokens, heard.models.concepts)
+    return "@retract_" in said and not said & {"@urgent_", "@relaxed_", "@usual_", "@undoword_"}
 
 
 def _by_number(heard: Heard, draft: Draft) -> list[Token]:
@@ -224,8 +237,12 @@ def _fill_task(heard: Heard, draft: Draft, filled: Filled) -> None:
     new_task.read_type(heard, extra)
     filled.trouble = extra.trouble
     said = new_task.said_priority(_NOT_SO.sub(" ", heard.line))
+    urgency = classes(heard.tokens, heard.models.concepts) & {"@urgent_", "@relaxed_"}
     if len(said) == 1:
         extra.parameters["priority"] = said.pop()
+    elif urgency and not said and not heard.of(*_SPOTS):
+        priority = new_task.asked_priority(heard, Filled(), "change_task_priority")
+        extra.parameters |= {"priority": priority} if priority else {}
     filled.parameters |= extra.parameters
     words = [one for one in heard.tokens if one.kind not in ("mark",)]
     bare = len(words) == 1 and words[0].kind in ("word", "unknown_label")
@@ -357,6 +374,7 @@ def _strange_name(heard: Heard) -> Token | None:
 
 def _fill_name(heard: Heard, filled: Filled, name: str, known: Sequence[str]) -> None:
     named = heard.of(name)
+    named = [one for one in named if one.value != "all"] or named
     if len(named) == 1:
         filled.parameters[name] = named[0].value
     elif named:

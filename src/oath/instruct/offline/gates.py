@@ -68,7 +68,7 @@ REASONS: Mapping[str, str] = {
 }
 """What is said of an instruction that is not clear, by a class of words in it, in this order."""
 
-IN_ANSWERS = ("@unit_", "@alternative_", "@condition_", "@hearsay_", "@hedge_", "@nearly_")
+IN_ANSWERS = ("@unit_", "@alternative_", "@condition_", "@hearsay_", "@hedge_")
 """Classes of words that keep also a mere answer from being taken."""
 
 

@@ -1,9 +1,7 @@
-"""What the models are trained on: what people said, and templates.
+"""Templates and the lexicon.
 
-``said.csv`` holds utterances in families, each with what it means in the paper's maze, in the form
-of `oath.bench.utterances`; ``asides.csv`` what people say around an instruction, which is harmless,
-or holds it back; ``training.txt`` templates, whose choices are drawn and slots filled from sample
-worlds; ``lexicon.txt`` words and phrases by what they do in an instruction.
+``templates.txt`` holds what operators say in templates, whose choices are drawn and slots filled
+from sample worlds; ``lexicon.txt`` words and phrases by what they do in an instruction.
 """
 
 from __future__ import annotations
@@ -18,7 +16,7 @@ from oath.instruct.offline.features import Concepts, stem
 from oath.instruct.offline.names import KINDS, Names, key, plain, tag
 from oath.instruct.offline.tokens import Token, clean, lex
 
-SOURCE = "training.txt"
+SOURCE = "templates.txt"
 LEXICON = "lexicon.txt"
 
 GATED = "gated"
@@ -52,7 +50,7 @@ class Drawn:
 
 def lines() -> tuple[list[Line], dict[str, str]]:
     """The lines of the training text, and its named sets of choices."""
-    text = files("oath.instruct.offline").joinpath(SOURCE).read_text(encoding="utf-8")
+    text = files("oath.training").joinpath(SOURCE).read_text(encoding="utf-8")
     found: list[Line] = []
     macros: dict[str, str] = {}
     intent = family = ""
@@ -71,7 +69,7 @@ def lines() -> tuple[list[Line], dict[str, str]]:
 
 def lexicon() -> dict[str, list[str]]:
     """Words and phrases by what they do in an instruction."""
-    text = files("oath.instruct.offline").joinpath(LEXICON).read_text(encoding="utf-8")
+    text = files("oath.training").joinpath(LEXICON).read_text(encoding="utf-8")
     rows = [row.partition(":") for row in text.splitlines() if row and row[0] != "#"]
     return {name: [one.strip() for one in entries.split(",")] for name, _, entries in rows}
 

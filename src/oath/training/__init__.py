@@ -1,0 +1,1 @@
+"""How the offline interpreter learns: what people said, templates, a lexicon, and the fitting."""
