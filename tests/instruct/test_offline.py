@@ -461,7 +461,7 @@ def test_a_priority_that_was_never_said_is_asked_for() -> None:
 
 
 @pytest.mark.parametrize(
-    "words", ["forget it, somebody has done it", "Scratch that, he walks over himself."]
+    "words", ["forget it, somebody has done it", "Scratch that, Dave does the rest."]
 )
 def test_a_draft_is_dropped_in_more_words(words: str) -> None:
     reply = say("add a task at (5, 17)", words)
