@@ -12,7 +12,7 @@ import io
 import random
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from importlib.resources import files
@@ -26,11 +26,13 @@ from oath.bench.utterances import Utterance, same, world
 from oath.commands import Live
 from oath.instruct import Dialogue, Reply
 from oath.instruct.offline import Offline, features
+from oath.instruct.offline.features import Concepts
 from oath.instruct.offline.gates import as_line
 from oath.instruct.offline.model import NAMES, WEIGHTS, Linear, Models, key
 from oath.instruct.offline.names import Names, plain, tag
 from oath.instruct.offline.new_task import said_priority
 from oath.instruct.offline.spelling import nearest
+from oath.instruct.offline.tokens import Token
 from oath.training.said import (
     HERE,
     Aside,
@@ -173,97 +175,99 @@ def _part(family: str) -> int:
 _EMPTY = Linear(("act",), np.zeros(0, dtype=np.uint32), np.zeros((0, 1)), np.zeros(1))
 
 
+Example = tuple[set[str], str]
+"""Features, and the class that they belong to."""
+
+
 def understanding(
     said: Sequence[Utterance], templates: Sequence[Drawn], there: Mapping[bool, Live]
 ) -> Models:
     """The models but for what is clear, which takes everything to be."""
+    blank = _blank(said, list(there[False].state.tasks))
+    called = {paused: Names.of(live, blank) for paused, live in there.items()}
+    heard = [Heard(one, tuple(tag(one.turns[-1], called[one.resumes]))) for one in said]
+    acting = [one for one in templates if one.line.intent != GATED]
+    alike = blank.concepts
+    return replace(
+        blank,
+        intent=_learn(_intents(heard, acting, alike)),
+        priority=_learn(_priorities(heard, acting, alike)),
+        mention=_learn(_mentions(heard, acting, alike, there)),
+        kind=_learn(_kinds(heard, alike), strength=0.3, balance=0.3),
+    )
+
+
+def _learn(examples: Iterable[Example], strength: float = 0.05, balance: float = 0.5) -> Linear:
+    rows, labels = zip(*examples, strict=True)
+    return fit(rows, labels, strength=strength, balance=balance)
+
+
+def _blank(said: Sequence[Utterance], labels: Sequence[str]) -> Models:
+    """Models that know words, and labels from words, and nothing else."""
     rows, macros = lines()
-    alike, words = concepts(macros), everyday(rows, macros)
-    labels = list(there[False].state.tasks)
-    names = list(label_or_word(said, labels))
-    name = fit([found for found, _ in names], [label for _, label in names], strength=0.3)
+    words = everyday(rows, macros)
     counts = Counter(
         word for one in said for word in {t.text for t in plain(one.turns[-1]) if t.kind == "word"}
     )
     known = words | {word for word, count in counts.items() if _is_word(word, count, words)}
     known |= {word for some in lexicon().values() for one in some for word in one.split()}
-    blank = Models(
+    return Models(
         intent=_EMPTY,
         priority=_EMPTY,
         mention=_EMPTY,
         kind=_EMPTY,
-        name=name,
+        name=_learn(label_or_word(said, labels), strength=0.3),
         clear=_EMPTY,
         everyday=words,
         known=frozenset(known),
-        concepts=alike,
-    )
-    called = {paused: Names.of(live, blank) for paused, live in there.items()}
-    heard = [Heard(one, tuple(tag(one.turns[-1], called[one.resumes]))) for one in said]
-    drawn_ = [one for one in templates if one.line.intent != GATED]
-
-    line = {id(one): features.of_line(one.tokens, alike) for one in heard}
-    line |= {id(one): features.of_line(one.tokens, alike) for one in drawn_}
-    told = [one for one in heard if one.said.intent or one.said.kind == "none"]
-    intents = [_intent(one.said) for one in told]
-    intent = fit(
-        [line[id(one)] for one in (*told, *drawn_)],
-        [*intents, *(one.line.intent.partition(":")[0] for one in drawn_)],
+        concepts=concepts(macros),
     )
 
-    asked = [(one, what) for one in heard if (what := priority(one.said))]
-    changes = [one for one in drawn_ if one.line.intent.startswith("change_task_priority:")]
-    rates = [
-        features.of_priority(line[id(one)], one.said.intent, said_priority(as_line(one.tokens)))
-        for one, _ in asked
-    ]
-    rates += [
-        features.of_priority(
-            line[id(one)], "change_task_priority", said_priority(as_line(one.tokens))
-        )
-        for one in changes
-    ]
-    wanted = [what for _, what in asked] + [one.line.intent.partition(":")[2] for one in changes]
-    rate = fit(rates, wanted)
 
-    spots = [
-        (features.of_mention(one.tokens, at, alike, one.said.intent), role)
-        for one in heard
-        for at, role in roles(one, there[one.said.resumes])
-    ]
-    placed = [
-        (features.of_mention(one.tokens, at, alike, one.line.intent), role)
-        for one in drawn_
-        for at, role in one.roles
-    ]
-    mention = fit(
-        [found for found, _ in (*spots, *placed)],
-        [role for _, role in (*spots, *placed)],
-    )
+def _intents(heard: Sequence[Heard], acting: Sequence[Drawn], alike: Concepts) -> Iterator[Example]:
+    for one in heard:
+        if one.said.intent or one.said.kind == "none":
+            yield features.of_line(one.tokens, alike), one.said.intent or "other"
+    for each in acting:
+        yield features.of_line(each.tokens, alike), each.line.intent.partition(":")[0]
 
-    words_of = [
-        (features.of_kind(one.tokens, at, alike), part)
-        for one in heard
-        for at, part in kind_words(one) or ()
-    ]
-    kind = fit(
-        [found for found, _ in words_of],
-        [label for _, label in words_of],
-        strength=0.3,
-        balance=0.3,
-    )
-    return replace(blank, intent=intent, priority=rate, mention=mention, kind=kind)
+
+def _priorities(
+    heard: Sequence[Heard], acting: Sequence[Drawn], alike: Concepts
+) -> Iterator[Example]:
+    def found(tokens: Sequence[Token], intent: str) -> set[str]:
+        named = said_priority(as_line(tokens))
+        return features.of_priority(features.of_line(tokens, alike), intent, named)
+
+    for one in heard:
+        if wanted := priority(one.said):
+            yield found(one.tokens, one.said.intent), wanted
+    for each in acting:
+        intent, _, wanted = each.line.intent.partition(":")
+        if wanted:
+            yield found(each.tokens, intent), wanted
+
+
+def _mentions(
+    heard: Sequence[Heard], acting: Sequence[Drawn], alike: Concepts, there: Mapping[bool, Live]
+) -> Iterator[Example]:
+    for one in heard:
+        for at, role in roles(one, there[one.said.resumes]):
+            yield features.of_mention(one.tokens, at, alike, one.said.intent), role
+    for each in acting:
+        for at, role in each.roles:
+            yield features.of_mention(each.tokens, at, alike, each.line.intent), role
+
+
+def _kinds(heard: Sequence[Heard], alike: Concepts) -> Iterator[Example]:
+    for one in heard:
+        for at, part in kind_words(one) or ():
+            yield features.of_kind(one.tokens, at, alike), part
 
 
 def _is_word(word: str, count: int, everyday: frozenset[str]) -> bool:
     """Whether a word that was said is none that somebody mistyped."""
     return word.isalpha() and count > (1 if nearest(word, everyday) is None else 8)
-
-
-def _intent(said: Utterance) -> str:
-    if said.kind == "none":
-        return said.intent or "other"
-    return said.intent
 
 
 class Told:
