@@ -11,8 +11,9 @@ from pydantic import ValidationError
 from oath.commands import COMMANDS, Command
 from oath.instruct import Reply
 from oath.instruct.offline import gates, questions, slots
+from oath.instruct.offline.features import classes
 from oath.instruct.offline.heard import Filled, Heard
-from oath.instruct.offline.new_task import asked_priority
+from oath.instruct.offline.new_task import asked_priority, said_priority
 from oath.instruct.offline.tokens import Token
 
 CLEAR = 0.8
@@ -168,6 +169,8 @@ def _is_plain_order(heard: Heard, intent: str) -> bool:
     trained = heard.models
     words = [one.text for one in heard.tokens if one.kind == "word"]
     named = {one.kind for one in heard.tokens} - {"word", "mark"}
+    if intent == "change_task_priority" and not _says_priority(heard):
+        return False
     return (
         intent in _ORDERS
         and named <= _ORDERS[intent]
@@ -176,6 +179,16 @@ def _is_plain_order(heard: Heard, intent: str) -> bool:
         and heard.tokens[0].text not in _ASK
         and all(one.text != "?" for one in heard.tokens)
         and gates.reason(heard.tokens, trained.concepts) is None
+    )
+
+
+_PRIORITIES = {"@urgent_", "@relaxed_", "@usual_", "@more_", "@less_"}
+
+
+def _says_priority(heard: Heard) -> bool:
+    """Whether words name a priority, or say which way it changes."""
+    return bool(
+        said_priority(heard.line) or _PRIORITIES & classes(heard.tokens, heard.models.concepts)
     )
 
 
